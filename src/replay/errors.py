@@ -1,0 +1,97 @@
+"""Every error a user can meet: what is wrong, where, what was expected, and how to mend it.
+
+The command line prints the message alone and leaves with the class's ``exit_code``;
+a traceback is for our own mistakes, never for a user's input.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class ReplayError(Exception):
+    """Root of the tree: an error whose message is written for the user."""
+
+    exit_code = 1
+
+
+class InputError(ReplayError):
+    """A file or setting that cannot be used.
+
+    Parameters
+    ----------
+    file
+        The offending file.
+    found
+        What is there, in a full sentence or clause.
+    expected
+        What would have been right.
+    mend
+        What the user can do about it.
+    line
+        One-based line in `file`, where there is one.
+    column
+        Name of the column or dotted path of the setting, where there is one.
+    """
+
+    exit_code = 2
+
+    def __init__(
+        self,
+        file: str | Path,
+        found: str,
+        *,
+        expected: str = "",
+        mend: str = "",
+        line: int | None = None,
+        column: str | None = None,
+    ) -> None:
+        self.file, self.found, self.expected, self.mend = str(file), found, expected, mend
+        self.line, self.column = line, column
+        super().__init__(self._sentence())
+
+    def _sentence(self) -> str:
+        where = self.file if self.line is None else f"{self.file}:{self.line}"
+        if self.column:
+            where = f"{where}: {self.column}"
+        parts = [f"{where}: {self.found}"]
+        if self.expected:
+            parts.append(f"expected: {self.expected}")
+        if self.mend:
+            parts.append(f"mend: {self.mend}")
+        return "\n    ".join(parts)
+
+
+class InputErrors(ReplayError):
+    """Several `InputError` of one reading, so that a user mends them all at once."""
+
+    exit_code = 2
+
+    def __init__(self, errors: list[InputError]) -> None:
+        self.errors = errors
+        count = f"{len(errors)} problems\n" if len(errors) > 1 else ""
+        super().__init__(count + "\n".join(str(e) for e in errors))
+
+
+class GateError(ReplayError):
+    """A gate of the protocol refuses the play; the message names the checks that failed."""
+
+    exit_code = 3
+
+
+class InstabilityError(ReplayError):
+    """The solver stopped itself: NaN, runaway speed, an inverted element, a collapsed time step."""
+
+    exit_code = 3
+
+
+class ResumeError(ReplayError):
+    """A checkpoint that does not belong to this model, code or version."""
+
+    exit_code = 2
+
+
+class BundleError(ReplayError):
+    """A bundle that does not verify; the message names the first bad file."""
+
+    exit_code = 1
