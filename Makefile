@@ -1,0 +1,71 @@
+# Two commands on a fresh machine: `make run` and `make test`. Everything else is here too.
+#
+#   make run [PLAY=demo]   install (first time), replay the play, print the verdict and where the bundle is
+#   make test              the whole test suite
+#   make quick             the suite without its slow tests
+#   make check             formatting, lint, types, spelling, workflow lint
+#   make bench             speed, as ratios to a peer in the same run
+#   make report            the workflow's own report (needs a finished run)
+#   make lock              resolve environment.lock again from pyproject.toml (needs uv)
+#   make clean             remove results; `make distclean` also removes the environment
+
+SHELL := /bin/bash
+PLAY ?= demo
+VENV := .venv
+PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
+UV := $(shell command -v uv 2>/dev/null)
+IN := source $(VENV)/bin/activate &&
+READY := $(VENV)/.ready
+
+.PHONY: run test quick check bench report lock clean distclean install
+.DEFAULT_GOAL := run
+
+run: $(READY)
+	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip
+	@$(IN) replay verdict results/$(PLAY)
+
+test: $(READY)
+	$(IN) pytest
+
+quick: $(READY)
+	$(IN) pytest -m "not slow"
+
+check: $(READY)
+	$(IN) ruff check . && ruff format --check .
+	$(IN) snakefmt --check Snakefile workflow
+	$(IN) mypy
+	$(IN) codespell src tests docs workflow config *.md Makefile Snakefile
+	$(IN) snakemake --lint
+
+bench: $(READY)
+	$(IN) python -m benchmarks
+
+report: $(READY)
+	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip
+
+install: $(READY)
+
+# The environment is made aside and takes its name when it is complete: a broken download leaves nothing half-installed.
+$(READY): environment.lock pyproject.toml
+	@echo "installing the locked environment into $(VENV) (once; a few minutes with pip, less than one with uv)"
+	@rm -rf $(VENV)
+ifneq ($(UV),)
+	$(UV) venv --quiet --python $(PYTHON) $(VENV)
+	$(UV) pip install --quiet --python $(VENV)/bin/python --require-hashes -r environment.lock
+	$(UV) pip install --quiet --python $(VENV)/bin/python --no-deps --no-build-isolation -e .
+else
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --require-hashes -r environment.lock
+	$(VENV)/bin/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+endif
+	@touch $(READY)
+
+lock:
+	uv pip compile --universal --generate-hashes --python-version 3.11 --extra dev \
+	    --custom-compile-command "make lock" pyproject.toml -o environment.lock
+
+clean:
+	rm -rf results .snakemake
+
+distclean: clean
+	rm -rf $(VENV) .numba_cache .pytest_cache .ruff_cache .mypy_cache
