@@ -1,0 +1,57 @@
+# What the rules share: which sources a stage stands on, and the lock on the results folder.
+import fcntl
+from pathlib import Path
+
+SOURCE = Path(workflow.basedir) / "src" / "replay"
+LEAVES = ("errors.py", "files.py", "tables.py", "manifest.py", "play.py")
+_held = []
+
+
+def code(*rooms):
+    """Source files of the named rooms (folders or files of the package) and of the leaves all rooms use.
+
+    Snakemake does not see imports; as inputs, an edit of any of them reruns the stage.
+    """
+    files = [SOURCE / leaf for leaf in LEAVES]
+    for room in rooms:
+        path = SOURCE / room
+        files += (
+            sorted(p for p in path.rglob("*") if p.suffix in (".py", ".yaml"))
+            if path.is_dir()
+            else [path]
+        )
+    return [p.relative_to(workflow.basedir).as_posix() for p in files]
+
+
+def play_files(wildcards):
+    """Everything in the play's folder but its description, which the settings stage reads."""
+    folder = Path("config/plays") / wildcards.play
+    return sorted(
+        p.as_posix() for p in folder.glob("*") if p.is_file() and p.name != "play.yaml"
+    )
+
+
+def stage(name):
+    """The manifest that a stage writes last, when all its files are on the disk with their hashes."""
+    return f"results/{{play}}/{name}/manifest.json"
+
+
+def log(name):
+    return f"results/{{play}}/logs/{name}.log"
+
+
+def hold_results_lock():
+    """Refuse a second run in this folder.
+
+    The kernel drops this lock with the process, however it dies: unlike Snakemake's own lock file, a
+    killed run leaves nothing to unlock, so the next `snakemake` just goes on (profile: nolock).
+    """
+    Path("results").mkdir(exist_ok=True)
+    handle = open("results/.lock", "w")
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        raise SystemExit(
+            "another run works in this folder's results/: wait for it, or run in another checkout"
+        ) from None
+    _held.append(handle)

@@ -1,0 +1,67 @@
+# The verdict, the page a person reads, and the bundle another laboratory checks.
+
+
+rule verdict:
+    input:
+        settings=stage("settings"),
+        stages=[
+            stage(name)
+            for name in (
+                "reconstruction",
+                "assembly",
+                "shake",
+                "replay",
+                "sensitivity",
+                "fidelity",
+                "measures",
+                "decks",
+            )
+        ],
+        code=code("stages/verdict.py", "stages/frame.py", "gates"),
+    output:
+        stage("verdict"),
+    log:
+        log("verdict"),
+    message:
+        "{wildcards.play}: collect the gates into one verdict"
+    shell:
+        "replay judge {wildcards.play} 2>&1 | tee {log}"
+
+
+rule report:
+    input:
+        verdict=stage("verdict"),
+        code=code("stages/report.py", "stages/frame.py", "report"),
+    output:
+        manifest=stage("report"),
+        page=report(
+            "results/{play}/report/report.html",
+            caption="../report/page.rst",
+            category="Replay",
+            labels={"play": "{play}", "what": "report"},
+        ),
+    log:
+        log("report"),
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    message:
+        "{wildcards.play}: write the report"
+    shell:
+        "replay report {wildcards.play} 2>&1 | tee {log}"
+
+
+rule seal:
+    input:
+        report=stage("report"),
+        lock="environment.lock",
+        code=code("stages/seal.py", "stages/frame.py", "bundle"),
+    output:
+        bundle="results/{play}/bundle/{play}.zip",
+        digest="results/{play}/bundle/{play}.zip.sha256",
+    log:
+        log("seal"),
+    message:
+        "{wildcards.play}: seal the bundle"
+    shell:
+        "replay seal {wildcards.play} 2>&1 | tee {log}"
