@@ -1,0 +1,176 @@
+"""The command line: one sub-command a stage, and the only place that parses arguments.
+
+Exit codes: 0 done, 1 a bundle that does not verify or a run that could not go on, 2 an input that cannot be
+used, 3 a gate that refuses the play.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from replay import __version__
+from replay.errors import ReplayError
+
+_STAGES: dict[str, tuple[str, str]] = {
+    "settings": ("settings", "check play.yaml and write the resolved settings"),
+    "inputs": ("inputs", "check the raw tracks and keep copies with their hashes"),
+    "reconstruct": ("reconstruct", "tracks or wearable -> 6-DOF motion of the skull CG"),
+    "assemble": ("assemble", "build the head and helmet; helmet and assembly gates"),
+    "drive": ("drive", "resample the motion for the solver"),
+    "decks": ("decks", "write Velodyne-style and LS-DYNA run decks"),
+    "shake": ("shake", "1 ms of free flight of the helmet alone"),
+    "solve": ("solve", "the explicit replay"),
+    "sensitivity": ("sensitivity", "the replay at half the hourglass coefficient"),
+    "fidelity": ("fidelity", "applied motion against the target"),
+    "measure": ("measure", "head, brain and action measures"),
+    "judge": ("verdict", "collect the gates into one verdict"),
+    "report": ("report", "figures and the self-contained page"),
+    "seal": ("seal", "the sealed bundle"),
+}
+_GATED = ("reconstruct", "assemble", "shake", "solve", "sensitivity", "fidelity")
+_SOLVING = ("shake", "solve", "sensitivity")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="replay",
+        description="One football play -> 6-DOF motion -> finite-element replay -> gates -> report -> sealed bundle.",
+        epilog="The whole chain is `make run` or `snakemake`; every stage can be run by itself as well.",
+    )
+    parser.add_argument("--version", action="version", version=f"replay {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    for name, (_, text) in _STAGES.items():
+        command = commands.add_parser(name, help=text, description=text)
+        _add_workspace(command)
+        if name == "settings":
+            command.add_argument(
+                "--resolution",
+                default="as-the-play-says",
+                choices=["as-the-play-says", "tiny", "coarse"],
+                help="override model.resolution of the play",
+            )
+        if name in _GATED:
+            command.add_argument(
+                "--carry-on",
+                action="store_true",
+                help="record a failed gate, let later stages skip themselves, exit 0: rejected plays are sealed too",
+            )
+        if name in _SOLVING:
+            command.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
+
+    verdict = commands.add_parser("verdict", help="print the verdict of a finished run; exit 3 when it is rejected")
+    verdict.add_argument("results", type=Path, help="results/<play>")
+
+    verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
+    verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
+
+    compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
+    compare.add_argument("old", type=Path)
+    compare.add_argument("new", type=Path)
+
+    synth = commands.add_parser("synth", help="write a synthetic play with known truth")
+    synth.add_argument("kind", choices=["demo", "broadcast", "wearable"], help="which camera or sensor sees the impact")
+    synth.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for the play")
+    synth.add_argument(
+        "--seed", type=int, default=None, help="seed of the click or sensor noise (default: the shipped play's)"
+    )
+
+    model = commands.add_parser("model", help="build a head and helmet model by itself")
+    model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
+    model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse"])
+    model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
+    model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
+
+    commands.add_parser("doctor", help="check this machine and environment")
+    schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
+    schema.add_argument("--out", type=Path, help="write it to a file instead")
+    return parser
+
+
+def _add_workspace(command: argparse.ArgumentParser) -> None:
+    command.add_argument("play", help="name of the play: a folder of --plays")
+    command.add_argument("--plays", type=Path, default=Path("config/plays"), help="folder of the plays")
+    command.add_argument("--results", type=Path, default=Path("results"), help="where results/<play> lies")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        message = "must be at least 1"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
+def _run_stage(arguments: argparse.Namespace) -> int:
+    import importlib
+
+    from replay.stages.frame import Workspace
+
+    module = importlib.import_module(f"replay.stages.{_STAGES[arguments.command][0]}")
+    workspace = Workspace(arguments.play, plays=arguments.plays, results=arguments.results)
+    options: dict[str, object] = {}
+    if arguments.command == "settings":
+        options["resolution"] = None if arguments.resolution == "as-the-play-says" else arguments.resolution
+    if arguments.command in _SOLVING:
+        options["threads"] = arguments.threads
+    refusal = module.run(workspace, **options)
+    if refusal:
+        print(refusal, file=sys.stderr)
+        return 0 if arguments.carry_on else 3
+    return 0
+
+
+def _run_tool(arguments: argparse.Namespace) -> int:
+    from replay.stages import tools
+
+    call: dict[str, Callable[[], int]] = {
+        "verdict": lambda: tools.show_verdict(arguments.results),
+        "verify": lambda: tools.verify_bundle(arguments.bundle),
+        "compare": lambda: tools.compare_bundles(arguments.old, arguments.new),
+        "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
+        "model": lambda: tools.write_model_file(
+            arguments.preset, arguments.resolution, arguments.out, arguments.preview
+        ),
+        "schema": lambda: tools.write_schema(arguments.out),
+    }
+    return call[arguments.command]()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; print a user's mistake as one message and return its exit code.
+
+    Parameters
+    ----------
+    argv
+        Arguments after the program's name; the process's own by default.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    arguments = _parser().parse_args(argv)
+    try:
+        if arguments.command == "doctor":
+            from replay.doctor import examine
+
+            return examine()
+        return _run_stage(arguments) if arguments.command in _STAGES else _run_tool(arguments)
+    except ReplayError as error:
+        print(f"replay {arguments.command}: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print(f"replay {arguments.command}: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
