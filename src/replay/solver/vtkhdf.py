@@ -107,9 +107,7 @@ class StatesWriter:
 
     def _reopen(self, header: bytes) -> BinaryIO:
         if not self.partial_path.is_file():
-            message = (
-                f"{self.partial_path}: the states of the interrupted run are missing\n    mend: start the run anew"
-            )
+            message = f"{self.partial_path}: the states of the interrupted run are gone\n    mend: start the run anew"
             raise ResumeError(message)
         stream = self.partial_path.open("rb+")
         if stream.read(len(header)) != header:
@@ -286,9 +284,7 @@ class StatesWriter:
     def __enter__(self) -> StatesWriter:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
             self.close()
         else:
