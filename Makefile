@@ -1,6 +1,7 @@
 # Two commands on a fresh machine: `make run` and `make test`. Everything else is here too.
 #
-#   make run [PLAY=demo]   install (first time), replay the play, print the verdict and where the bundle is
+#   make run               install (first time), replay the play, print the verdict and where the bundle is
+#                          (PLAY=demo, PLAYS=<folder of plays>, RESOLUTION=tiny|coarse)
 #   make test              the whole test suite
 #   make quick             the suite without its slow tests
 #   make check             formatting, lint, types, spelling, workflow lint
@@ -11,6 +12,10 @@
 
 SHELL := /bin/bash
 PLAY ?= demo
+PLAYS ?=
+RESOLUTION ?=
+OVERRIDES := $(if $(PLAYS),plays_folder=$(PLAYS)) $(if $(RESOLUTION),resolution=$(RESOLUTION))
+CONFIG := $(if $(strip $(OVERRIDES)),--config $(strip $(OVERRIDES)))
 VENV := .venv
 PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
 UV := $(shell command -v uv 2>/dev/null)
@@ -21,7 +26,7 @@ READY := $(VENV)/.ready
 .DEFAULT_GOAL := run
 
 run: $(READY)
-	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip
+	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip $(CONFIG)
 	@$(IN) replay verdict results/$(PLAY)
 
 test: $(READY)
@@ -41,7 +46,7 @@ bench: $(READY)
 	$(IN) python -m benchmarks
 
 report: $(READY)
-	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip
+	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip $(CONFIG)
 
 install: $(READY)
 

@@ -2,8 +2,12 @@
 import fcntl
 from pathlib import Path
 
+import yaml
+
 SOURCE = Path(workflow.basedir) / "src" / "replay"
 LEAVES = ("errors.py", "files.py", "tables.py", "manifest.py", "play.py")
+PLAYS = config["plays_folder"]
+TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
 _held = []
 
 
@@ -24,11 +28,16 @@ def code(*rooms):
 
 
 def play_files(wildcards):
-    """Everything in the play's folder but its description, which the settings stage reads."""
-    folder = Path("config/plays") / wildcards.play
-    return sorted(
-        p.as_posix() for p in folder.glob("*") if p.is_file() and p.name != "play.yaml"
-    )
+    """The tracks that the play's description names; what is wrong with it is the settings stage's to say."""
+    folder = Path(PLAYS) / wildcards.play
+    try:
+        source = yaml.safe_load((folder / "play.yaml").read_text(encoding="utf-8"))[
+            "source"
+        ]
+        names = [source[key] for key in TRACKS if isinstance(source.get(key), str)]
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
+        return []
+    return [(folder / name).as_posix() for name in names if (folder / name).is_file()]
 
 
 def stage(name):

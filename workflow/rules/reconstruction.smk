@@ -3,18 +3,19 @@
 
 rule settings:
     input:
-        play="config/plays/{play}/play.yaml",
+        play=f"{PLAYS}/{{play}}/play.yaml",
         code=code("stages/settings.py", "stages/frame.py"),
     output:
         stage("settings"),
     log:
         log("settings"),
     params:
+        plays=PLAYS,
         resolution=config.get("resolution") or "as-the-play-says",
     message:
         "{wildcards.play}: check and resolve the play's settings"
     shell:
-        "replay settings {wildcards.play} --resolution {params.resolution} 2>&1 | tee {log}"
+        "replay settings {wildcards.play} --plays {params.plays} --resolution {params.resolution} 2>&1 | tee {log}"
 
 
 rule inputs:
@@ -26,10 +27,12 @@ rule inputs:
         stage("inputs"),
     log:
         log("inputs"),
+    params:
+        plays=PLAYS,
     message:
         "{wildcards.play}: check the raw tracks and keep copies with their hashes"
     shell:
-        "replay inputs {wildcards.play} 2>&1 | tee {log}"
+        "replay inputs {wildcards.play} --plays {params.plays} 2>&1 | tee {log}"
 
 
 rule reconstruct:

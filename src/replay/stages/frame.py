@@ -1,0 +1,200 @@
+"""What every stage does the same way: read what came before, refuse what changed, write its manifest last."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from replay import __version__
+from replay.errors import InputError
+from replay.manifest import NAME, Artifact, StageManifest, check_manifest, write_manifest
+
+if TYPE_CHECKING:
+    from replay.gates import Gate
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where one play's files are.
+
+    Parameters
+    ----------
+    play
+        Name of the play.
+    plays
+        Folder of the plays; ``plays/<play>/play.yaml`` describes this one.
+    results
+        Folder of the results; everything of this play goes to ``results/<play>``.
+    """
+
+    play: str
+    plays: Path = Path("config/plays")
+    results: Path = Path("results")
+
+    @property
+    def description(self) -> Path:
+        """The play's own description."""
+        return self.plays / self.play / "play.yaml"
+
+    def folder(self, stage: str) -> Path:
+        """Folder of a stage."""
+        return self.results / self.play / stage
+
+
+class Stage:
+    """One run of one stage.
+
+    Parameters
+    ----------
+    workspace
+        Where the play's files are.
+    name
+        Name of the stage: its folder.
+    after
+        The stages whose files this one may read; they must have finished, and their files must not have
+        changed since.
+    keep
+        Names in the folder that survive from an unfinished run (a checkpoint).
+
+    Raises
+    ------
+    InputError
+        When an earlier stage has not finished or one of its files changed.
+    """
+
+    def __init__(self, workspace: Workspace, name: str, *, after: Sequence[str] = (), keep: Sequence[str] = ()) -> None:
+        self.workspace, self.name = workspace, name
+        self.folder = workspace.folder(name)
+        self._before: dict[str, StageManifest] = {}
+        for stage in after:
+            try:
+                self._before[stage] = check_manifest(workspace.folder(stage))
+            except InputError as error:
+                raise InputError(
+                    error.file, error.found, expected=error.expected, mend=f"run `replay {_COMMANDS[stage]}` again"
+                ) from None
+        self._inputs: dict[str, Path] = {}
+        self._artifacts: list[Artifact] = []
+        self._prepare(keep)
+
+    def _prepare(self, keep: Sequence[str]) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        (self.folder / NAME).unlink(missing_ok=True)
+        for path in self.folder.iterdir():
+            if path.name not in keep:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    @property
+    def stopped_by(self) -> str | None:
+        """Why an earlier stage ended the play, or None."""
+        return next((m.stopped_by for m in self._before.values() if m.stopped_by), None)
+
+    def manifest_of(self, stage: str) -> StageManifest:
+        """Manifest of an earlier stage."""
+        return self._before[stage]
+
+    def read(self, stage: str, path: str) -> Path:
+        """Path of an earlier stage's file, which becomes an input of this one.
+
+        Raises
+        ------
+        InputError
+            When that stage did not make the file.
+        """
+        if self._before[stage].artifact(path) is None:
+            raise InputError(
+                self.workspace.folder(stage) / path,
+                f"stage {stage} made no such file",
+                mend=f"run `replay {_COMMANDS[stage]}` again",
+            )
+        return self.read_file(f"{stage}/{path}", self.workspace.folder(stage) / path)
+
+    def read_file(self, name: str, path: Path) -> Path:
+        """Record any other file as an input under `name`."""
+        self._inputs[name] = path
+        return path
+
+    def write(self, path: str, meaning: str, *, unit: str = "", volatile: bool = False) -> Path:
+        """Path for a file of this stage, listed in its manifest."""
+        self._artifacts.append(
+            Artifact.volatile(path, meaning) if volatile else Artifact.exact(path, meaning, unit=unit)
+        )
+        full = self.folder / path
+        full.parent.mkdir(parents=True, exist_ok=True)
+        return full
+
+    def write_all(self, meanings: dict[str, str]) -> Path:
+        """List several files of this stage at once; return its folder."""
+        for path, meaning in meanings.items():
+            self.write(path, meaning)
+        return self.folder
+
+    def skip(self) -> str:
+        """Write the manifest of a stage that an earlier gate made needless; return why."""
+        reason = self.stopped_by or ""
+        self._artifacts.clear()
+        self._seal(reason, {})
+        return f"{self.name}: not run, {reason}"
+
+    def finish(self, gates: Iterable[Gate] = (), *, parameters: dict[str, Any] | None = None) -> str | None:
+        """Write the manifest.
+
+        Parameters
+        ----------
+        gates
+            Judged in this stage; each is printed, and one that stops the play is recorded.
+        parameters
+            Settings that the result depends on.
+
+        Returns
+        -------
+        str or None
+            Why the play ends here, or None.
+        """
+        refusal: str | None = None
+        for gate in gates:
+            print(f"gate {gate.name}: {gate.verdict}")
+            for check in gate.causes():
+                print(f"    {check.verdict}: {check.sentence()}")
+            if gate.stops and refusal is None:
+                worst = next(check for check in gate.causes() if check.verdict == "fail")
+                refusal = f"stopped by gate {gate.name}: {worst.sentence()}"
+        self._seal(refusal, parameters or {})
+        print(f"{self.name}: wrote {len(self._artifacts)} files to {self.folder}")
+        return refusal
+
+    def _seal(self, stopped_by: str | None, parameters: dict[str, Any]) -> None:
+        write_manifest(
+            self.folder,
+            stage=self.name,
+            play=self.workspace.play,
+            artifacts=self._artifacts,
+            inputs=self._inputs,
+            status="stopped" if stopped_by else "done",
+            stopped_by=stopped_by,
+            parameters=parameters,
+            versions={"replay": __version__, "python": platform.python_version()},
+        )
+
+
+_COMMANDS = {
+    "settings": "settings",
+    "inputs": "inputs",
+    "reconstruction": "reconstruct",
+    "driver": "drive",
+    "assembly": "assemble",
+    "decks": "decks",
+    "shake": "shake",
+    "replay": "solve",
+    "sensitivity": "sensitivity",
+    "fidelity": "fidelity",
+    "measures": "measure",
+    "verdict": "judge",
+    "report": "report",
+    "bundle": "seal",
+}
+STAGES = tuple(_COMMANDS)
