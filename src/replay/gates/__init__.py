@@ -1,0 +1,34 @@
+"""Gates: every accept or reject decision of the protocol, and nothing else."""
+
+from replay.gates.assembly import assembly_gate
+from replay.gates.fidelity import fidelity_gate
+from replay.gates.helmet import helmet_gate
+from replay.gates.hourglass_sensitivity import convergence_class, hourglass_sensitivity_gate
+from replay.gates.limits import Limit, Limits
+from replay.gates.model import Check, Gate, read_gate
+from replay.gates.numerics import PartEnergy, numerics_gate
+from replay.gates.package import package_gate
+from replay.gates.reconstruction import video_reconstruction_gate, wearable_reconstruction_gate
+from replay.gates.shake import shake_gate
+from replay.gates.verdict import PlayVerdict, play_verdict
+
+__all__ = [
+    "Check",
+    "Gate",
+    "Limit",
+    "Limits",
+    "PartEnergy",
+    "PlayVerdict",
+    "assembly_gate",
+    "convergence_class",
+    "fidelity_gate",
+    "helmet_gate",
+    "hourglass_sensitivity_gate",
+    "numerics_gate",
+    "package_gate",
+    "play_verdict",
+    "read_gate",
+    "shake_gate",
+    "video_reconstruction_gate",
+    "wearable_reconstruction_gate",
+]

@@ -1,0 +1,54 @@
+"""Helmet shake: does the helmet fly undisturbed for a millisecond? (article, protocol 1.6, 1.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from replay.gates.limits import Limits
+from replay.gates.model import Gate, Judge
+
+NO_CONTACT = "no contact in this model"
+
+CHECKS = (
+    "ran_to_end",
+    "negative_volumes",
+    "min_time_step_s",
+    "edge_stretch_max",
+    "edge_stretch_min",
+    "part_velocity_deviation",
+    "stress_over_impact_stress",
+    "stress_growth",
+    "energy_ratio",
+    "momentum_drift",
+)
+
+
+def shake_gate(run: Mapping[str, Any], limits: Limits, *, contact_blow_up: bool | None = None) -> Gate:
+    """Judge the free flight of the helmet with the controls of the replay.
+
+    Parameters
+    ----------
+    run
+        One entry per name of `CHECKS`; a text in place of a number is the reason why that
+        check has no power (such as a run that stopped before it could be measured),
+        ``<name>_detail`` adds a sentence.
+
+        - ``ran_to_end``: whether the solver reached the termination time.
+        - ``negative_volumes``: number of elements with J <= 0 at any state.
+        - ``min_time_step_s``.
+        - ``edge_stretch_max``, ``edge_stretch_min``: of any element edge, present over initial length.
+        - ``part_velocity_deviation``: greatest |v_part - v_0| / |v_0|, v_part the
+          velocity of a part's centre of gravity.
+        - ``stress_over_impact_stress``: peak von Mises over rho c v_0 of the same part.
+        - ``stress_growth``: peak von Mises of the last third of the run over that of the
+          middle third (or over 1 % of rho c v_0, if that is more).
+        - ``energy_ratio``: the value farthest from one.
+        - ``momentum_drift``: |p - p_0| / |p_0|, greatest.
+    contact_blow_up
+        Whether contact went unstable; None for a model without contact.
+    """
+    judge = Judge("shake", limits)
+    judge.check_all(run, CHECKS)
+    judge.check("contact_blow_up", NO_CONTACT if contact_blow_up is None else contact_blow_up)
+    return judge.gate()
