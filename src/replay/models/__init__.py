@@ -1,0 +1,5 @@
+"""Head and helmet: the hexahedral model, its materials, its numbers and its picture."""
+
+from replay.models.model import Model, Part, read_model, write_model
+
+__all__ = ["Model", "Part", "read_model", "write_model"]
