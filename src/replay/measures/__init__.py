@@ -1,0 +1,48 @@
+"""Measures: numbers that describe a motion, a deformation, a run; none of them a verdict on a person."""
+
+from replay.measures.action import ACTION_TABLE, crossover_time, mechanical_action, write_action
+from replay.measures.brain import BrainRecorder, read_snapshots, regional_summary
+from replay.measures.fidelity import Motion, compare, fidelity
+from replay.measures.head import bric, damage_deflection, hic, peak, resultant, severity_index
+from replay.measures.kinematics import head_measures
+from replay.measures.shake import ShakeRecorder, shake_measures
+from replay.measures.strain import (
+    green_lagrange,
+    logarithmic,
+    maximum_shear_strain,
+    principal_stretches,
+    tensile_pressure,
+    volume_fraction_at_least,
+    von_mises,
+    weighted_percentile,
+)
+
+__all__ = [
+    "ACTION_TABLE",
+    "BrainRecorder",
+    "Motion",
+    "ShakeRecorder",
+    "bric",
+    "compare",
+    "crossover_time",
+    "damage_deflection",
+    "fidelity",
+    "green_lagrange",
+    "head_measures",
+    "hic",
+    "logarithmic",
+    "maximum_shear_strain",
+    "mechanical_action",
+    "peak",
+    "principal_stretches",
+    "read_snapshots",
+    "regional_summary",
+    "resultant",
+    "severity_index",
+    "shake_measures",
+    "tensile_pressure",
+    "volume_fraction_at_least",
+    "von_mises",
+    "weighted_percentile",
+    "write_action",
+]
