@@ -31,7 +31,7 @@ _STAGES: dict[str, tuple[str, str]] = {
     "report": ("report", "figures and the self-contained page"),
     "seal": ("seal", "the sealed bundle"),
 }
-_GATED = ("reconstruct", "assemble", "shake", "solve", "sensitivity", "fidelity")
+_ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
 _SOLVING = ("shake", "solve", "sensitivity")
 
 
@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
                 choices=["as-the-play-says", "tiny", "coarse"],
                 help="override model.resolution of the play",
             )
-        if name in _GATED:
+        if name not in _ALWAYS_RUN:
             command.add_argument(
                 "--carry-on",
                 action="store_true",
@@ -62,6 +62,9 @@ def _parser() -> argparse.ArgumentParser:
             )
         if name in _SOLVING:
             command.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
+            command.add_argument(
+                "--checkpoint-every", type=float, default=60.0, metavar="SECONDS", help="wall-clock checkpoint period"
+            )
 
     verdict = commands.add_parser("verdict", help="print the verdict of a finished run; exit 3 when it is rejected")
     verdict.add_argument("results", type=Path, help="results/<play>")
@@ -117,11 +120,11 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     if arguments.command == "settings":
         options["resolution"] = None if arguments.resolution == "as-the-play-says" else arguments.resolution
     if arguments.command in _SOLVING:
-        options["threads"] = arguments.threads
+        options |= {"threads": arguments.threads, "checkpoint_every_s": arguments.checkpoint_every}
     refusal = module.run(workspace, **options)
     if refusal:
         print(refusal, file=sys.stderr)
-        return 0 if arguments.carry_on else 3
+        return 0 if getattr(arguments, "carry_on", True) else 3
     return 0
 
 

@@ -341,8 +341,10 @@ class Play(Setting):
     model: ModelChoice = Field(default_factory=lambda: ModelChoice(), description="The finite-element model.")
     solver: SolverSettings = Field(default_factory=lambda: SolverSettings(), description="Controls of the solver.")
     shake: Shake = Field(default_factory=lambda: Shake(), description="Stability check of the helmet.")
-    gates: dict[str, Number] = Field(
-        default_factory=dict, description="Limits this play loosens, by the check's name; reported as loosened."
+    gates: dict[str, Number | dict[str, Number]] = Field(
+        default_factory=dict,
+        description="Limits this play sets itself, `gate.check: number` or `gate.check: {fail_above: number}`; "
+        "a looser one is reported as loosened.",
     )
     _folder: Path = PrivateAttr(default=Path())
 
@@ -354,6 +356,12 @@ class Play(Setting):
     def file(self, name: str) -> Path:
         """Path of a file that the play names."""
         return self._folder / name
+
+    def lying_in(self, folder: Path) -> Play:
+        """Return the same play with the files it names in another folder (the checked copies of a run)."""
+        moved = self.model_copy()
+        moved._folder = Path(folder)
+        return moved
 
     @property
     def files(self) -> tuple[Path, ...]:

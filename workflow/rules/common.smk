@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 
 SOURCE = Path(workflow.basedir) / "src" / "replay"
-LEAVES = ("errors.py", "files.py", "tables.py", "manifest.py", "play.py")
+LEAVES = ("documents.py", "errors.py", "files.py", "tables.py", "manifest.py", "play.py")
 PLAYS = config["plays_folder"]
 TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
 _held = []

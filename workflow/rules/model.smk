@@ -61,4 +61,4 @@ rule decks:
     message:
         "{wildcards.play}: write the run decks for other solvers"
     shell:
-        "replay decks {wildcards.play} 2>&1 | tee {log}"
+        "replay decks {wildcards.play} --carry-on 2>&1 | tee {log}"

@@ -4,7 +4,7 @@
 rule settings:
     input:
         play=f"{PLAYS}/{{play}}/play.yaml",
-        code=code("stages/settings.py", "stages/frame.py"),
+        code=code("stages/settings.py", "stages/frame.py", "gates"),
     output:
         stage("settings"),
     log:
@@ -67,4 +67,4 @@ rule drive:
     message:
         "{wildcards.play}: resample the motion for the solver"
     shell:
-        "replay drive {wildcards.play} 2>&1 | tee {log}"
+        "replay drive {wildcards.play} --carry-on 2>&1 | tee {log}"

@@ -92,4 +92,4 @@ rule measure:
     message:
         "{wildcards.play}: measure the head, the brain and the mechanical action"
     shell:
-        "replay measure {wildcards.play} 2>&1 | tee {log}"
+        "replay measure {wildcards.play} --carry-on 2>&1 | tee {log}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import platform
 import shutil
 from collections.abc import Iterable, Sequence
@@ -10,11 +11,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay import __version__
-from replay.errors import InputError
+from replay.errors import InputError, ReplayError
 from replay.manifest import NAME, Artifact, StageManifest, check_manifest, write_manifest
 
 if TYPE_CHECKING:
     from replay.gates import Gate
+
+_LOCK = ".lock"
 
 
 @dataclass(frozen=True)
@@ -79,14 +82,32 @@ class Stage:
                 ) from None
         self._inputs: dict[str, Path] = {}
         self._artifacts: list[Artifact] = []
-        self._prepare(keep)
+        self._keep = (*keep, _LOCK)
+        self._begun = False
+        self._lock()
 
-    def _prepare(self, keep: Sequence[str]) -> None:
-        self.folder.mkdir(parents=True, exist_ok=True)
+    def _begin(self) -> None:
+        """Clear the folder, manifest first; only now, so that an input that cannot be used costs no old result."""
+        if self._begun:
+            return
+        self._begun = True
         (self.folder / NAME).unlink(missing_ok=True)
         for path in self.folder.iterdir():
-            if path.name not in keep:
+            if path.name not in self._keep:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    def _lock(self) -> None:
+        """Refuse a second writer: a killed workflow can leave its solver running. The kernel drops the lock."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._held = (self.folder / _LOCK).open("w")
+        try:
+            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            message = (
+                f"{self.folder}: another process is writing this stage\n"
+                "    mend: wait for it, or end it (a killed workflow can leave its solver running)"
+            )
+            raise ReplayError(message) from None
 
     @property
     def stopped_by(self) -> str | None:
@@ -120,6 +141,7 @@ class Stage:
 
     def write(self, path: str, meaning: str, *, unit: str = "", volatile: bool = False) -> Path:
         """Path for a file of this stage, listed in its manifest."""
+        self._begin()
         self._artifacts.append(
             Artifact.volatile(path, meaning) if volatile else Artifact.exact(path, meaning, unit=unit)
         )
@@ -136,7 +158,7 @@ class Stage:
     def skip(self) -> str:
         """Write the manifest of a stage that an earlier gate made needless; return why."""
         reason = self.stopped_by or ""
-        self._artifacts.clear()
+        self._begin()
         self._seal(reason, {})
         return f"{self.name}: not run, {reason}"
 

@@ -1,0 +1,48 @@
+"""Stage ``settings``: the play's description, checked and resolved, as an artifact of the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from replay.files import read_json, write_json
+from replay.gates import Limits
+from replay.play import ModelChoice, Play, load_play
+from replay.stages.frame import Stage, Workspace
+
+FILE = "play.json"
+
+
+def run(workspace: Workspace, *, resolution: str | None = None) -> str | None:
+    """Check ``play.yaml`` and write it with every default and override spelled out.
+
+    Parameters
+    ----------
+    workspace
+        Where the play's files are.
+    resolution
+        Replaces the play's own ``model.resolution``.
+    """
+    play = load_play(workspace.description)
+    Limits.load(play.gates, file=workspace.description)
+    if resolution:
+        model = ModelChoice.model_validate({**play.model.model_dump(), "resolution": resolution})
+        play = play.model_copy(update={"model": model})
+    stage = Stage(workspace, "settings")
+    stage.read_file("play.yaml", workspace.description)
+    source = {
+        key: Path(value).name if key in _TRACKS and value else value
+        for key, value in play.source.model_dump(mode="json").items()
+    }
+    resolved = {**play.model_dump(mode="json"), "source": source}
+    write_json(stage.write(FILE, "the play with every default spelled out"), resolved)
+    print(f"{play.name}: {play.title or 'no title'} ({play.source.kind}, {play.model.resolution})")
+    return stage.finish()
+
+
+_TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
+
+
+def read_settings(stage: Stage) -> Play:
+    """Settings of the play for a later stage; the tracks it names lie in the folder of stage ``inputs``."""
+    play = Play.model_validate(read_json(stage.read("settings", FILE)))
+    return play.lying_in(stage.workspace.folder("inputs"))
