@@ -12,6 +12,7 @@ Classes of artifacts
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
@@ -181,7 +182,7 @@ def write_manifest(
     """
     folder = Path(folder)
     listed = sorted(artifacts, key=lambda a: a.path)
-    twice = {a.path for a in listed if [b.path for b in listed].count(a.path) > 1}
+    twice = {path for path, times in Counter(a.path for a in listed).items() if times > 1}
     missing = [a.path for a in listed if not (folder / a.path).is_file()]
     foreign = [name for name in inputs or {} if not is_plain_path(name)]
     if twice or missing or foreign or NAME in {a.path for a in listed}:
