@@ -1,0 +1,155 @@
+"""Comparing: exact to the byte, tolerance by the number, volatile not at all."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import shutil
+import zipfile
+
+import h5py
+import numpy as np
+import pytest
+
+from replay.bundle import compare
+from replay.bundle.numbers import worst
+from replay.errors import BundleError, InputError
+
+from .conftest import fabricate
+
+
+def by_path(comparison) -> dict:
+    return {d.path: d for d in comparison.differences}
+
+
+def test_two_equal_runs_are_identical_whatever_their_logs(tmp_path, sealed):
+    result = compare(sealed(), sealed(log=b"took half an hour\n"))
+    assert result.agree
+    assert result.identical
+    assert by_path(result)["results/replay/run.log"].outcome == "not compared"
+    assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "same"
+    assert "README.md" in by_path(result)
+    assert result.text().startswith("the runs agree: ")
+
+
+def test_a_difference_within_tolerance_agrees_but_is_not_identical(sealed):
+    result = compare(sealed(), sealed(shift=1e-10))
+    assert result.agree
+    assert not result.identical
+    histories = by_path(result)["results/replay/histories.csv"]
+    assert histories.outcome == "within"
+    assert histories.worst.where == "line 5, x_m"
+    assert by_path(result)["results/replay/manifest.json"].outcome == "within"
+
+
+def test_a_difference_beyond_tolerance_is_named_with_its_unit(sealed):
+    result = compare(sealed(), sealed(shift=1e-3))
+    assert not result.agree
+    worst_one = result.differences[0]
+    assert (worst_one.path, worst_one.outcome) == ("results/replay/histories.csv", "differs")
+    assert worst_one.worst.absolute == pytest.approx(1e-3)
+    assert "worst at line 5, x_m: " in result.text()
+    assert "(by 0.001 m, relative" in result.text()
+
+
+def test_an_exact_artifact_may_not_differ_in_one_byte(tmp_path, sealed, source_root):
+    from replay.bundle import seal
+    from replay.manifest import Artifact, write_manifest
+
+    results = fabricate(tmp_path)
+    (results / "driver/driver_6dof.csv").write_text("time_s,x_m\n0.0,1.00\n")
+    write_manifest(
+        results / "driver", stage="driver", play="demo", artifacts=[Artifact.exact("driver_6dof.csv", "driver")]
+    )
+    seal(results, tmp_path / "demo.zip", source_root=source_root)
+    result = compare(sealed(), tmp_path / "demo.zip")
+    assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "differs"
+    assert not result.agree
+
+
+def test_folders_unpacked_bundles_and_archives_compare_with_one_another(tmp_path, sealed):
+    results = fabricate(tmp_path)
+    with zipfile.ZipFile(sealed()) as archive:
+        archive.extractall(tmp_path)
+    for other in (sealed(), tmp_path / "demo"):
+        for pair in ((results, other), (other, results)):
+            result = compare(*pair)
+            assert result.identical
+            assert all(d.path.startswith("results/") for d in result.differences)
+    assert compare(sealed(), tmp_path / "demo").identical
+
+
+def test_what_one_run_lacks_is_named(tmp_path, sealed):
+    results = fabricate(tmp_path)
+    shutil.rmtree(results / "decks")
+    assert {d.path for d in compare(sealed(), results).differences if d.outcome == "missing"} == {
+        "results/decks/manifest.json",
+        "results/decks/velodyne/velodyne.card",
+    }
+    assert compare(results, sealed()).count("extra") == 2
+
+
+def test_what_is_no_run_is_refused(tmp_path, sealed):
+    with pytest.raises(BundleError, match="does not exist"):
+        compare(sealed(), tmp_path / "none.zip")
+    (tmp_path / "demo").mkdir()
+    with pytest.raises(InputError, match="no stage has finished"):
+        compare(tmp_path / "demo", sealed())
+
+
+def apart(path: str, old: bytes, new: bytes, rtol: float = 0.0, atol: float = 0.0):
+    return worst(path, io.BytesIO(old), io.BytesIO(new), rtol, atol)
+
+
+def hdf(**datasets: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        for name, values in datasets.items():
+            file[f"group/{name}"] = values
+    return stream.getvalue()
+
+
+def test_the_worst_entry_is_the_one_farthest_beyond_its_tolerance():
+    found = apart("a.csv", b"t,x\n0,100\n1,1\n", b"t,x\n0,101\n1,1.5\n", rtol=0.1)
+    assert (found.where, found.old, found.new, found.within) == ("line 3, x", "1.0", "1.5", False)
+    assert (found.absolute, found.relative) == (0.5, 0.5)
+    assert apart("a.csv", b"t,x\n0,100\n", b"t,x\n0,101\n", rtol=0.1).within
+    assert not apart("a.csv", b"t,x\n0,100\n", b"t,x\n0,101\n", atol=0.99).within
+
+
+@pytest.mark.parametrize(
+    ("path", "old", "new", "where"),
+    [
+        ("a.csv", b"t,x\n0,1\n", b"t,x\n0,1\n1,2\n", "line 3, t"),
+        ("a.csv", b"t,x\n0,a\n", b"t,x\n0,b\n", "line 2, x"),
+        ("a.csv", b"t,x\n0,nan\n", b"t,x\n0,1\n", "line 2, x"),
+        ("a.csv", b"t,x\n0,1\n", b"t,y\n0,1\n", "line 2, x"),
+        ("a.json", b'{"a": {"b": [1, 2]}}', b'{"a": {"b": [1, 3]}}', "a.b[1]"),
+        ("a.json", b'{"a": 1}', b'{"a": null}', "a"),
+        ("a.json", b"{}", b"hello", "the file"),
+    ],
+)
+def test_what_is_no_number_or_not_on_both_sides_is_never_within(path, old, new, where):
+    found = apart(path, old, new, rtol=1e-3, atol=1e-3)
+    assert found.where == where
+    assert not found.within
+
+
+def test_arrays_are_compared_entry_by_entry():
+    values = np.arange(12.0).reshape(4, 3)
+    other = values.copy()
+    other[2, 1] += 0.25
+    found = apart("a.h5", hdf(x=values), hdf(x=other), atol=0.3)
+    assert (found.where, found.absolute, found.within) == ("group/x[2, 1]", 0.25, True)
+    assert apart("a.h5", hdf(x=values), hdf(x=values)) is None
+    shape = apart("a.vtkhdf", hdf(x=values), hdf(x=values[:2]), atol=9.0)
+    assert not shape.within
+    assert math.isnan(shape.absolute)
+    missing = apart("a.h5", hdf(x=values), hdf(y=values))
+    assert (missing.where, missing.old, missing.new) == ("group/x", "there", "missing")
+
+
+def test_the_order_of_keys_is_part_of_a_json_file():
+    found = apart("a.json", json.dumps({"a": 1, "b": 2}).encode(), json.dumps({"b": 2, "a": 1}).encode())
+    assert found.where == "(keys)"
