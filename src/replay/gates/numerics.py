@@ -27,8 +27,6 @@ CONTACT_CHECKS = (
     "penetration_over_edge",
 )
 _ENERGIES = ("kinetic_J", "internal_J", "hourglass_J", "bulk_viscosity_J", "external_work_J", "total_J")
-# Where the reference energy is below this share of its peak the ratio is noise over noise.
-_LEAST_REFERENCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -111,8 +109,9 @@ def _energy_balance(judge: Judge, energy: Mapping[str, NDArray], steps: NDArray 
             judge.check(name, float("nan"), detail)
         return
     scale = float(np.abs(reference).max())
-    told = np.abs(reference) >= _LEAST_REFERENCE * scale
-    detail = f"over {int(told.sum())} of {told.size} rows: reference energy above 1 % of its peak {scale:.4g} J"
+    least = judge.parameter("energy_reference_least")
+    told = np.abs(reference) >= least * scale
+    detail = f"over {int(told.sum())} of {told.size} rows: reference energy above {least:g} of its peak {scale:.4g} J"
     judge.check("energy_ratio_min", float(ratio[told].min()), detail)
     judge.check("energy_ratio_max", float(ratio[told].max()), detail)
     error = total - reference

@@ -21,7 +21,7 @@ from replay.report.figure import (
     ORANGE,
     SKY,
     THIRD,
-    VERMILLION,
+    VERMILION,
     Picture,
     finish,
     house_style,
@@ -44,7 +44,7 @@ _HEAD_QUANTITIES = (
 )
 _LEDGER = (
     ("kinetic_J", "kinetic", BLUE, "-"),
-    ("internal_J", "internal", VERMILLION, "-"),
+    ("internal_J", "internal", VERMILION, "-"),
     ("external_work_J", "external work", GREEN, "--"),
     ("hourglass_J", "hourglass", ORANGE, "-."),
     ("bulk_viscosity_J", "bulk viscosity", SKY, ":"),
@@ -139,7 +139,7 @@ def energy_charts(energy: pd.DataFrame) -> list[Picture]:
         ratio = energy["ratio"].to_numpy(dtype=float)
         axes.axhspan(0.99, 1.01, color="#e3f2ec", zorder=0, label="passes")
         for edge in (0.95, 1.05):
-            axes.axhline(edge, color=VERMILLION, lw=1.0, ls="--", label="fails beyond" if edge < 1 else None)
+            axes.axhline(edge, color=VERMILION, lw=1.0, ls="--", label="fails beyond" if edge < 1 else None)
         axes.plot(t, ratio, color=BLACK, label="energy ratio")
         axes.set(xlabel=TIME_LABEL, ylabel="ratio (1)", title="Energy ratio")
         finite = ratio[np.isfinite(ratio)]
@@ -164,7 +164,7 @@ def time_step_chart(timestep: pd.DataFrame, floor_s: float | None, mass_scaling_
         if mass_scaling_s:
             axes.axhline(1e6 * mass_scaling_s, color=GREY, lw=1.1, ls="-.", label="mass-scaling target")
         if floor_s:
-            axes.axhline(1e6 * floor_s, color=VERMILLION, lw=1.1, ls="--", label="floor")
+            axes.axhline(1e6 * floor_s, color=VERMILION, lw=1.1, ls="--", label="floor")
         axes.set(xlabel=TIME_LABEL, ylabel="time step (µs)", title="Stable time step")
         axes.set_ylim(bottom=0)
         legend_below(axes, 3)
@@ -186,7 +186,7 @@ def hourglass_chart(part_energy: pd.DataFrame) -> Picture:
     with house_style():
         figure, (axes,) = new_figure((HALF[0], max(2.0, 0.27 * len(share) + 1.1)))
         places = np.arange(len(share))[::-1]
-        colours = [VERMILLION if s > 10 else ORANGE if s > 5 else BLUE for s in share]
+        colours = [VERMILION if s > 10 else ORANGE if s > 5 else BLUE for s in share]
         axes.barh(places, share, color=colours, height=0.62)
         for limit, dash in ((5, ":"), (10, "--")):
             axes.axvline(limit, color=BLACK, lw=0.9, ls=dash)
@@ -242,7 +242,7 @@ def pressure_chart(histories: pd.DataFrame) -> Picture:
         figure, (axes,) = new_figure((HALF[0], 3.6))
         t = _milliseconds(rows)
         axes.plot(t, rows["tensile_pressure_p95_Pa"] / 1e3, color=BLUE, label="tensile pressure, 95th percentile")
-        axes.plot(t, rows["von_mises_p95_Pa"] / 1e3, color=VERMILLION, ls="--", label="von Mises, 95th percentile")
+        axes.plot(t, rows["von_mises_p95_Pa"] / 1e3, color=VERMILION, ls="--", label="von Mises, 95th percentile")
         axes.set(xlabel=TIME_LABEL, ylabel="stress (kPa)", title="Brain stress")
         axes.set_ylim(bottom=0)
         legend_below(axes, 1)
@@ -261,7 +261,7 @@ def action_chart(action: pd.DataFrame, crossover_s: float | None = None) -> Pict
         ends = []
         for column, name, colour, dash in (
             ("head_J_s", "head", BLUE, "-"),
-            ("helmet_J_s", "helmet", VERMILLION, "--"),
+            ("helmet_J_s", "helmet", VERMILION, "--"),
             ("impactor_J_s", "impactor", GREEN, "-."),
         ):
             if column in action and action[column].notna().any():

@@ -94,7 +94,11 @@ def motion_section(report: ReportInput, pictures: list[Picture]) -> str:
             for m in report.head_measures
         ]
         content += table(
-            "Measures of the head's motion", ["Measure", "Value", "Unit", "Definition", "Source"], rows, numeric=(1,)
+            "Measures of the head's motion",
+            ["Measure", "Value", "Unit", "Definition", "Source"],
+            rows,
+            numeric=(1,),
+            stack=True,
         )
     return content + quality_table(report.quality) + initial_conditions_table(report.initial_conditions)
 
@@ -213,6 +217,7 @@ def model_section(report: ReportInput, pictures: list[Picture]) -> str:
             ["Material", "Parameter", "Value", "Unit", "Certainty", "Source"],
             rows,
             numeric=(2,),
+            stack=True,
         )
     return content
 
