@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import flawless_play as flawless
 import numpy as np
+import pandas as pd
 import pytest
 
 from replay.gates import (
@@ -14,6 +15,7 @@ from replay.gates import (
     hourglass_sensitivity_gate,
     numerics_gate,
     package_gate,
+    part_energies,
     shake_gate,
     video_reconstruction_gate,
 )
@@ -117,6 +119,21 @@ def test_fluid_is_judged_by_its_share_of_the_whole(limits):
     assert checks["hourglass_share: csf"].value == pytest.approx(0.06 / 2.2)
     solid = (PartEnergy("brain", 2.0, 0.07), PartEnergy("csf", 0.2, 0.06))
     assert by_name(numerics(limits, parts=solid))["hourglass_share: csf"].verdict == "fail"
+
+
+def test_peak_energies_are_taken_part_by_part():
+    table = pd.DataFrame(
+        {
+            "pid": [1, 2, 1, 2],
+            "part": ["brain", "csf", "brain", "csf"],
+            "internal_J": [0.0, 0.1, 2.0, 0.05],
+            "hourglass_J": [0.0, 0.0, 0.02, 0.03],
+        }
+    )
+    assert part_energies(table, fluid_pids=[2]) == [
+        PartEnergy("brain", 2.0, 0.02),
+        PartEnergy("csf", 0.1, 0.03, fluid=True),
+    ]
 
 
 def test_part_with_less_than_a_thousandth_of_the_energy_has_no_say(limits):

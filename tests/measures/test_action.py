@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from replay.measures import ACTION_TABLE, crossover_time, mechanical_action, write_action
+from replay.errors import InputError
+from replay.measures import ACTION_TABLE, crossover_time, kinetic_energy_of, mechanical_action, write_action
 
 
 def test_action_of_a_free_body():
@@ -47,3 +49,12 @@ def test_driven_head_has_an_empty_impactor_column(tmp_path):
     table = ACTION_TABLE.read(tmp_path / "action.csv")
     assert table["impactor_J_s"].isna().all()
     assert table["head_J_s"].tolist() == [0.0, 2.0]
+
+
+def test_kinetic_energy_is_summed_over_the_parts_of_a_body():
+    table = pd.DataFrame(
+        {"time_s": [0.0, 0.0, 0.0, 1.0, 1.0, 1.0], "pid": [1, 2, 3] * 2, "kinetic_J": [1, 2, 4, 8, 16, 32]}
+    )
+    assert kinetic_energy_of(table, [1, 3]).tolist() == [5.0, 40.0]
+    with pytest.raises(InputError, match="part 9 is not there"):
+        kinetic_energy_of(table, [1, 9])

@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from replay.errors import InputError
 from replay.measures import Motion, compare, fidelity
 
 
@@ -126,3 +128,35 @@ def test_motion_is_read_from_the_drivers_columns():
     read = Motion.from_columns(table, prefix="skull_")
     for field in dataclasses.fields(Motion):
         assert np.array_equal(getattr(read, field.name), getattr(motion, field.name))
+
+
+def history_of(motion: Motion, pid: int = 7) -> pd.DataFrame:
+    """What the solver writes of a rigid part, beside a deformable one."""
+    columns = {"time_s": motion.time_s, "pid": pid, "part": "skull"}
+    for k, axis in enumerate("xyz"):
+        columns[f"{axis}_m"] = motion.position_m[:, k]
+        columns[f"v{axis}_m_per_s"] = motion.velocity_m_per_s[:, k]
+        columns[f"omega_{axis}_rad_per_s"] = motion.angular_velocity_rad_per_s[:, k]
+    for k, axis in enumerate("xyzw"):
+        columns[f"q{axis}"] = motion.quaternion[:, k]
+    skull = pd.DataFrame(columns)
+    soft = skull.assign(pid=8, part="brain", qx=np.nan, qy=np.nan, qz=np.nan, qw=np.nan)
+    return pd.concat([skull, soft]).sort_values("time_s", kind="stable", ignore_index=True)
+
+
+def test_accelerations_are_the_differences_of_the_recorded_velocities():
+    """Every 0.1 ms of a 30 ms sine: (w dt)^2 / 6 = 7e-5 of the peak."""
+    exact = turning_motion(301)
+    read = Motion.from_history(history_of(exact), 7)
+    peak = np.abs(exact.acceleration_m_per_s2).max()
+    assert np.abs(read.acceleration_m_per_s2 - exact.acceleration_m_per_s2)[1:-1].max() < 1e-4 * peak
+    result = fidelity(turning_motion(), read)
+    assert abs(result["linear_acceleration"]["delta_peak_percent"]) < 0.05
+    assert abs(result["angular_acceleration"]["delta_peak_percent"]) < 0.05
+    assert result["position_residual_mm"] < 1e-9
+
+
+@pytest.mark.parametrize(("pid", "message"), [(8, "301 rows, 0 of them with an orientation"), (9, "part 9 has 0 rows")])
+def test_part_that_is_not_rigid_has_no_motion(pid, message):
+    with pytest.raises(InputError, match=message):
+        Motion.from_history(history_of(turning_motion(301)), pid)

@@ -6,7 +6,7 @@ from replay.gates.helmet import helmet_gate
 from replay.gates.hourglass_sensitivity import convergence_class, hourglass_sensitivity_gate
 from replay.gates.limits import Limit, Limits
 from replay.gates.model import Check, Gate, read_gate
-from replay.gates.numerics import PartEnergy, numerics_gate
+from replay.gates.numerics import PartEnergy, numerics_gate, part_energies
 from replay.gates.package import package_gate
 from replay.gates.reconstruction import video_reconstruction_gate, wearable_reconstruction_gate
 from replay.gates.shake import shake_gate
@@ -26,6 +26,7 @@ __all__ = [
     "hourglass_sensitivity_gate",
     "numerics_gate",
     "package_gate",
+    "part_energies",
     "play_verdict",
     "read_gate",
     "shake_gate",

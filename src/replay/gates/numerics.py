@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from replay.gates.limits import Limits
@@ -47,6 +48,28 @@ class PartEnergy:
     internal_J: float
     hourglass_J: float
     fluid: bool = False
+
+
+def part_energies(table: pd.DataFrame, fluid_pids: Iterable[int] = ()) -> list[PartEnergy]:
+    """Take the peak energies of each part from the rows of part_energy.csv.
+
+    Parameters
+    ----------
+    table
+        ``pid``, ``part``, ``internal_J``, ``hourglass_J``, one row a part and time.
+    fluid_pids
+        Numbers of the fluid parts.
+    """
+    fluids = set(fluid_pids)
+    return [
+        PartEnergy(
+            name=str(rows["part"].iloc[0]),
+            internal_J=float(rows["internal_J"].max()),
+            hourglass_J=float(rows["hourglass_J"].max()),
+            fluid=int(cast(int, pid)) in fluids,
+        )
+        for pid, rows in table.groupby("pid", sort=False)
+    ]
 
 
 def numerics_gate(

@@ -1,6 +1,6 @@
 """Measures: numbers that describe a motion, a deformation, a run; none of them a verdict on a person."""
 
-from replay.measures.action import ACTION_TABLE, crossover_time, mechanical_action, write_action
+from replay.measures.action import ACTION_TABLE, crossover_time, kinetic_energy_of, mechanical_action, write_action
 from replay.measures.brain import BrainRecorder, read_snapshots, regional_summary
 from replay.measures.fidelity import Motion, compare, fidelity
 from replay.measures.head import bric, damage_deflection, hic, peak, resultant, severity_index
@@ -30,6 +30,7 @@ __all__ = [
     "green_lagrange",
     "head_measures",
     "hic",
+    "kinetic_energy_of",
     "logarithmic",
     "maximum_shear_strain",
     "mechanical_action",

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from replay.errors import InputError
 from replay.tables import Column, TableFormat
 
+_ENERGY_FILE = "part_energy.csv"
 ACTION_TABLE = TableFormat(
     "mechanical action",
     (
@@ -40,6 +44,22 @@ def mechanical_action(time_s: ArrayLike, kinetic_energy_J: ArrayLike) -> NDArray
         message = f"{time.shape} times for {energy.shape} energies"
         raise ValueError(message)
     return np.concatenate([[0.0], np.cumsum(0.5 * (energy[1:] + energy[:-1]) * np.diff(time))])
+
+
+def kinetic_energy_of(part_energy: pd.DataFrame, pids: Iterable[int]) -> NDArray[np.float64]:
+    """Sum the kinetic energy [J] of some parts at each time of part_energy.csv.
+
+    Raises
+    ------
+    InputError
+        When a part has no row.
+    """
+    wanted = set(pids)
+    missing = wanted - set(part_energy["pid"])
+    if missing:
+        raise InputError(_ENERGY_FILE, f"part {min(missing)} is not there", mend="run the replay again")
+    rows = part_energy[part_energy["pid"].isin(wanted)]
+    return rows.groupby("time_s", sort=True)["kinetic_J"].sum().to_numpy(dtype=float)
 
 
 def crossover_time(time_s: ArrayLike, first: ArrayLike, second: ArrayLike) -> float:
