@@ -13,6 +13,7 @@ from replay.gates import (
     convergence_class,
     fidelity_gate,
     hourglass_sensitivity_gate,
+    ledger_values,
     numerics_gate,
     package_gate,
     part_energies,
@@ -214,3 +215,20 @@ def test_wearable_package_asks_for_no_clicks(limits):
         package_gate(dict.fromkeys(WEARABLE_PACKAGE, (True, True)), limits, required=WEARABLE_PACKAGE).verdict == "pass"
     )
     assert "kinovea_clicks.csv" not in WEARABLE_PACKAGE
+
+
+def test_shake_takes_its_worst_ratio_and_step_from_the_ledger():
+    energy = flawless.good_ledger() | {"ratio": np.array([1.0, 1.004, 0.97, 1.02])}
+    energy["momentum_y_N_s"] = np.linspace(0, 3e-9, 50)
+    found = ledger_values(energy, [0.0, 4e-7, 3e-7])
+    assert found == {"energy_ratio": 0.97, "momentum_drift": pytest.approx(5e-10), "min_time_step_s": 3e-7}
+
+
+def test_shake_that_never_moved_says_so(limits):
+    energy = {name: np.zeros(3) for name in flawless.good_ledger()} | {"ratio": np.array([1.0, np.nan, 1.0])}
+    found = ledger_values(energy, [0.0])
+    gate = shake_gate(flawless.GOOD["shake"] | found, limits, contact_blow_up=False)
+    checks = by_name(gate)
+    assert checks["energy_ratio"].verdict == "fail"
+    assert checks["momentum_drift"].detail == "the system starts without momentum"
+    assert checks["min_time_step_s"].verdict == "vacuous"

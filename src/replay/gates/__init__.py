@@ -9,7 +9,7 @@ from replay.gates.model import Check, Gate, read_gate
 from replay.gates.numerics import PartEnergy, numerics_gate, part_energies
 from replay.gates.package import package_gate
 from replay.gates.reconstruction import video_reconstruction_gate, wearable_reconstruction_gate
-from replay.gates.shake import shake_gate
+from replay.gates.shake import ledger_values, shake_gate
 from replay.gates.verdict import PlayVerdict, play_verdict
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "fidelity_gate",
     "helmet_gate",
     "hourglass_sensitivity_gate",
+    "ledger_values",
     "numerics_gate",
     "package_gate",
     "part_energies",

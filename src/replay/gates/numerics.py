@@ -115,7 +115,7 @@ def numerics_gate(
         _energy_balance(judge, table, None if steps is None else np.asarray(steps))
         _hourglass(judge, parts)
     if free:
-        judge.check("momentum_drift", _momentum_drift(table))
+        judge.check("momentum_drift", momentum_drift(table))
     judge.check_all(run, RUN_CHECKS)
     judge.check_all(contact if contact is not None else dict.fromkeys(CONTACT_CHECKS, NO_CONTACT), CONTACT_CHECKS)
     return judge.gate()
@@ -173,8 +173,9 @@ def _hourglass(judge: Judge, parts: Sequence[PartEnergy]) -> None:
         judge.check("hourglass_share", share, detail, of=part.name)
 
 
-def _momentum_drift(energy: Mapping[str, NDArray]) -> float | str:
-    momentum = np.stack([energy[f"momentum_{axis}_N_s"] for axis in "xyz"], axis=1)
+def momentum_drift(energy: Mapping[str, ArrayLike]) -> float | str:
+    """Greatest |p - p0| / |p0| over the rows of energy.csv, or the reason why there is none."""
+    momentum = np.stack([np.asarray(energy[f"momentum_{axis}_N_s"], dtype=float) for axis in "xyz"], axis=1)
     start = float(np.linalg.norm(momentum[0]))
     if start == 0.0:
         return "the system starts without momentum"

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from replay.gates.limits import Limits
 from replay.gates.model import Gate, Judge
+from replay.gates.numerics import momentum_drift
 
 NO_CONTACT = "no contact in this model"
 
@@ -22,6 +26,26 @@ CHECKS = (
     "energy_ratio",
     "momentum_drift",
 )
+
+
+def ledger_values(energy: Mapping[str, ArrayLike], time_step_s: ArrayLike) -> dict[str, Any]:
+    """Take ``energy_ratio``, ``momentum_drift`` and ``min_time_step_s`` from the solver's tables.
+
+    Parameters
+    ----------
+    energy
+        Columns of energy.csv.
+    time_step_s
+        Steps that were taken [s].
+    """
+    ratio = np.asarray(energy["ratio"], dtype=float)
+    worst = float(ratio[np.argmax(np.abs(ratio - 1.0))]) if np.isfinite(ratio).all() else float("nan")
+    steps = np.asarray(time_step_s, dtype=float)
+    return {
+        "energy_ratio": worst,
+        "momentum_drift": momentum_drift(energy),
+        "min_time_step_s": float(steps[steps > 0].min()) if (steps > 0).any() else "no step was taken",
+    }
 
 
 def shake_gate(run: Mapping[str, Any], limits: Limits, *, contact_blow_up: bool | None = None) -> Gate:
