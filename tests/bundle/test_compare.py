@@ -12,11 +12,12 @@ import h5py
 import numpy as np
 import pytest
 
-from replay.bundle import compare
+from replay.bundle import compare, seal
 from replay.bundle.numbers import worst
 from replay.errors import BundleError, InputError
+from replay.manifest import Artifact, write_manifest
 
-from .conftest import fabricate
+from .conftest import fabricate, fabricate_source
 
 
 def by_path(comparison) -> dict:
@@ -54,9 +55,6 @@ def test_a_difference_beyond_tolerance_is_named_with_its_unit(sealed):
 
 
 def test_an_exact_artifact_may_not_differ_in_one_byte(tmp_path, sealed, source_root):
-    from replay.bundle import seal
-    from replay.manifest import Artifact, write_manifest
-
     results = fabricate(tmp_path)
     (results / "driver/driver_6dof.csv").write_text("time_s,x_m\n0.0,1.00\n")
     write_manifest(
@@ -66,6 +64,16 @@ def test_an_exact_artifact_may_not_differ_in_one_byte(tmp_path, sealed, source_r
     result = compare(sealed(), tmp_path / "demo.zip")
     assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "differs"
     assert not result.agree
+
+
+def test_another_source_is_told_but_what_it_made_is_compared(tmp_path, sealed):
+    source = fabricate_source(tmp_path / "source")
+    (source / "src/replay/__init__.py").write_text('__version__ = "0.1.1"\n')
+    seal(fabricate(tmp_path), tmp_path / "demo.zip", source_root=source)
+    result = compare(sealed(), tmp_path / "demo.zip")
+    assert result.identical
+    assert "made with different source" in result.text()
+    assert "different source" not in compare(sealed(), sealed()).text()
 
 
 def test_folders_unpacked_bundles_and_archives_compare_with_one_another(tmp_path, sealed):

@@ -15,6 +15,7 @@ import pytest
 
 from replay.bundle import package_facts, seal, verify
 from replay.errors import InputError, ReplayError
+from replay.gates.package import VIDEO_PACKAGE
 
 from .conftest import commit, fabricate, fabricate_records, fabricate_source
 
@@ -175,8 +176,6 @@ def test_the_minimum_package_is_found_item_by_item(tmp_path, source_root):
 
 
 def test_the_package_items_are_those_the_gate_asks_for(tmp_path, source_root):
-    from replay.gates.package import VIDEO_PACKAGE
-
     assert set(VIDEO_PACKAGE) <= set(package_facts(fabricate(tmp_path), source_root))
 
 

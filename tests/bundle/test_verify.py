@@ -193,6 +193,7 @@ LIST = "data/artifacts.csv"
         (edit(LIST, b",exact,", b",roughly,"), "is not as artifacts.csv lists it"),
         (edit(LIST, b"path,bytes", b"file,bytes"), f"{LIST}: has other columns"),
         (edit(LIST, b"\n", b"\nx,y\n"), f"{LIST}: line 2 has 2 cells"),
+        (lambda f: f.update({LIST: f[LIST] + b"x" * 200_000}), f"{LIST}: is not a table"),
         (lambda f: f.update({LIST: f[LIST] + f[LIST].split(b"\n")[1] + b"\n"}), "is not both there and listed once"),
         (lambda f: f.update({"data/bundle.json": b"{}"}), "artifacts.csv lists it"),
     ],
@@ -219,6 +220,22 @@ def test_an_unpacked_bundle_verifies_and_is_checked_as_strictly(tmp_path, sealed
     verify(folder)
     (folder / "data/stray.txt").write_text("x")
     assert "data/stray.txt: was not sealed here" in complaint(folder)
+
+
+def test_what_a_bundle_says_of_itself_is_printed_without_control_characters(tmp_path, sealed):
+    change = edit("data/bundle.json", b'"verdict": "ACCEPTED"', b'"verdict": "\\u001b[2JACCEPTED"')
+
+    def both(files: dict[str, bytes]) -> None:
+        old = files["data/bundle.json"]
+        change(files)
+        new = files["data/bundle.json"]
+        for before, after in (
+            (hashlib.sha256(old).hexdigest().encode(), hashlib.sha256(new).hexdigest().encode()),
+            (f"bundle.json,{len(old)},".encode(), f"bundle.json,{len(new)},".encode()),
+        ):
+            edit(LIST, before, after)(files)
+
+    assert verify(resealed(sealed(), tmp_path / "demo.zip", with_crate(both))).verdict == "\\x1b[2JACCEPTED"
 
 
 def test_what_is_no_bundle_is_refused(tmp_path):

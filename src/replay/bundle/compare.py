@@ -21,8 +21,8 @@ from replay.manifest import NAME as MANIFEST
 Outcome = Literal["same", "within", "differs", "missing", "extra", "not compared"]
 _FINE = ("same", "within", "not compared")
 _ORDER: dict[Outcome, int] = {"differs": 0, "missing": 1, "extra": 2, "within": 3, "not compared": 4, "same": 5}
-# Lists of hashes: they differ exactly when what they list does, and that is compared itself.
-_INDEXES = ("bundle.json",)
+# Where a run came from, not what it made: told when it differs, but no reason for runs to disagree.
+_PROVENANCE = ("source/", "bundle.json", "README.md")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Difference:
         The artifact.
     outcome
         ``same`` bytes; ``within`` tolerance; ``differs``; ``missing`` in the new run; ``extra`` there;
-        ``not compared`` for a volatile one.
+        ``not compared`` for a volatile one, and for provenance that differs.
     worst
         Its worst entry, where the file holds numbers that differ.
     """
@@ -85,6 +85,8 @@ class Comparison:
         head = "the runs agree" if self.agree else "the runs differ"
         counts = ", ".join(f"{self.count(o)} {o}" for o in _ORDER if self.count(o))
         rows = [d.sentence() for d in self.differences if d.outcome not in ("same", "not compared")]
+        if any(d.outcome == "not compared" and d.path == "source/source.tar" for d in self.differences):
+            rows.append("the runs were made with different source (source/source.tar)")
         return "\n".join([f"{head}: {counts}", *rows])
 
 
@@ -123,7 +125,7 @@ def compare(old: str | Path, new: str | Path) -> Comparison:
     with _open(old) as before, _open(new) as after:
         both = before.sealed and after.sealed
         names = sorted(name for name in {*before.artifacts, *after.artifacts} if both or name.startswith("results/"))
-        found = [_compare_one(name, before, after) for name in names if name not in _INDEXES]
+        found = [_compare_one(name, before, after) for name in names]
     found.sort(key=lambda d: (_ORDER[d.outcome], -_beyond(d), d.path))
     return Comparison(old, new, tuple(found))
 
@@ -171,6 +173,8 @@ def _compare_one(name: str, before: _Side, after: _Side) -> Difference:
         return Difference(name, either.class_, either.unit, "extra" if old is None else "missing")
     if _same_bytes(old, new):
         return Difference(name, old.class_, old.unit, "same")
+    if name.startswith(_PROVENANCE):
+        return Difference(name, old.class_, "", "not compared")
     if name.endswith(f"/{MANIFEST}"):
         same = _essence(old, before, after) == _essence(new, before, after)
         return Difference(name, old.class_, "", "within" if same else "differs")

@@ -98,14 +98,14 @@ def verify(path: str | Path) -> VerifyReport:
     package = facts.get("minimum_package", {})
     return VerifyReport(
         path=path,
-        play=str(facts.get("play", "")),
-        verdict=str(facts.get("verdict", "")),
-        line=str(facts.get("line", "")),
+        play=shown(str(facts.get("play", ""))),
+        verdict=shown(str(facts.get("verdict", ""))),
+        line=shown(str(facts.get("line", ""))),
         files=len(payload),
         bytes=sum(d.size for d in payload.values()),
         sha256=digest,
         digest_checked=checked,
-        minimum_package={name: bool(item["present"] and item["hashed"]) for name, item in package.items()},
+        minimum_package={shown(name): bool(item["present"] and item["hashed"]) for name, item in package.items()},
     )
 
 
@@ -237,7 +237,10 @@ def read_listing(members: Members) -> list[dict[str, str]]:
         When it is not the table it should be.
     """
     name = bag.PAYLOAD + _LISTING
-    rows = list(csv.reader(io.StringIO(_text(members, name))))
+    try:
+        rows = list(csv.reader(io.StringIO(_text(members, name))))
+    except csv.Error as error:
+        raise _refuse(members, name, f"is not a table ({error})") from None
     if not rows or rows[0] != ARTIFACTS.names:
         raise _refuse(members, name, "has other columns than a list of artifacts")
     for number, row in enumerate(rows[1:], 2):
