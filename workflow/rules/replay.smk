@@ -35,6 +35,8 @@ rule solve:
 rule sensitivity:
     input:
         settings=stage("settings"),
+        assembly=stage("assembly"),
+        driver=stage("driver"),
         replay=stage("replay"),
         code=code(
             "stages/sensitivity.py",
@@ -64,7 +66,7 @@ rule sensitivity:
 rule fidelity:
     input:
         settings=stage("settings"),
-        reconstruction=stage("reconstruction"),
+        driver=stage("driver"),
         replay=stage("replay"),
         code=code("stages/fidelity.py", "stages/frame.py", "measures", "gates"),
     output:
@@ -80,7 +82,9 @@ rule fidelity:
 rule measure:
     input:
         settings=stage("settings"),
+        assembly=stage("assembly"),
         replay=stage("replay"),
+        sensitivity=stage("sensitivity"),
         code=code("stages/measure.py", "stages/frame.py", "measures", "models"),
     output:
         stage("measures"),

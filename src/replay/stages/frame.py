@@ -162,6 +162,12 @@ class Stage:
         self._seal(reason, {})
         return f"{self.name}: not run, {reason}"
 
+    def give_up(self, reason: str) -> str:
+        """Write the manifest of a stage that could not go on, with the files it did write; return `reason`."""
+        self._artifacts = [a for a in self._artifacts if (self.folder / a.path).is_file()]
+        self._seal(reason, {})
+        return reason
+
     def finish(self, gates: Iterable[Gate] = (), *, parameters: dict[str, Any] | None = None) -> str | None:
         """Write the manifest.
 

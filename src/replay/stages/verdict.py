@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from replay.bundle import package_facts
 from replay.files import write_json
-from replay.gates import Limits, PlayVerdict, play_verdict, read_gate
+from replay.gates import Gate, Limits, PlayVerdict, package_gate, play_verdict, read_gate
+from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
 from replay.stages.frame import Stage, Workspace
 from replay.stages.settings import read_settings
 
@@ -23,22 +27,36 @@ def limits_of(stage: Stage) -> Limits:
     return Limits.load(read_settings(stage).gates)
 
 
-def collect(stage: Stage) -> PlayVerdict:
-    """Verdict from the gates that earlier stages judged."""
+def collect(stage: Stage) -> list[Gate]:
+    """Gates that earlier stages judged."""
     limits = limits_of(stage)
-    gates = [
+    return [
         read_gate(stage.read(name, file), limits)
         for name, files in GATE_FILES.items()
         for file in files
         if stage.manifest_of(name).artifact(file)
     ]
-    return play_verdict(stage.workspace.play, gates, limits)
+
+
+def package(stage: Stage) -> Gate:
+    """Gate on the minimum reproducibility package, as it lies in the results."""
+    root = Path(__file__).resolve().parents[3]
+    facts = package_facts(stage.workspace.results / stage.workspace.play, root)
+    kind = read_settings(stage).source.kind
+    required = VIDEO_PACKAGE if kind == "clicks" else WEARABLE_PACKAGE
+    return package_gate(facts, limits_of(stage), required=required)
 
 
 def run(workspace: Workspace) -> str | None:
-    """Collect the gates and write ``verdict.json``."""
+    """Collect the gates, judge the package of a play that ran to its end, and write ``verdict.json``."""
     stage = Stage(workspace, "verdict", after=_AFTER)
-    verdict = collect(stage)
+    gates = collect(stage)
+    if not stage.stopped_by:
+        gates.append(package(stage))
+        gates[-1].write(stage.write("gate.json", "gate: reproducibility package"))
+    verdict: PlayVerdict = play_verdict(
+        workspace.play, gates, limits_of(stage), awaited=("package",) if stage.stopped_by else ()
+    )
     write_json(stage.write("verdict.json", "every gate of the play in one verdict"), verdict.to_json())
     stage.finish()
     print(verdict.line())

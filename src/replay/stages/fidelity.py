@@ -1,0 +1,44 @@
+"""Stage ``fidelity``: whether the skull of the model made the motion it was told to."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from replay.files import write_json
+from replay.gates import fidelity_gate
+from replay.measures import Motion, fidelity
+from replay.models import read_model
+from replay.motion import DRIVER
+from replay.stages.frame import Stage, Workspace
+from replay.stages.verdict import limits_of
+
+
+def run(workspace: Workspace) -> str | None:
+    """Compare target and applied motion of the skull's centre of gravity, and judge it."""
+    stage = Stage(workspace, "fidelity", after=["settings", "assembly", "driver", "replay"])
+    if stage.stopped_by:
+        return stage.skip()
+    target = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
+    result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage))
+    write_json(stage.write("fidelity.json", "target against applied motion, article Table 4"), result)
+    gate = fidelity_gate(
+        {**result, **{name: _judged(result[name]) for name in _QUANTITIES}}, limits_of(stage), prescribed=True
+    )
+    gate.write(stage.write("gate.json", "gate: driver fidelity"))
+    return stage.finish([gate])
+
+
+_QUANTITIES = ("linear_acceleration", "angular_acceleration", "angular_velocity")
+
+
+def skull_motion(stage: Stage) -> Motion:
+    """Motion of the driven skull, from the solver's histories."""
+    model = read_model(stage.read("assembly", "model.h5"))
+    skull = next(part.pid for part in model.parts if part.role == "skull")
+    return Motion.from_history(pd.read_csv(stage.read("replay", "histories.csv")), skull)
+
+
+def _judged(entry: dict[str, object]) -> dict[str, object]:
+    """What the gate judges of one quantity; a peak of zero has no percentage, and the check says so."""
+    names = ("rmse_percent_of_peak", "delta_peak_percent", "delta_time_to_peak_ms")
+    return {name: "the target's peak is zero" if entry[name] is None else entry[name] for name in names}

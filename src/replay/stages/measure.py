@@ -1,0 +1,73 @@
+"""Stage ``measures``: head, brain and mechanical action, as process diagnostics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from replay.files import write_json
+from replay.gates import convergence_class, read_gate
+from replay.measures import (
+    Motion,
+    crossover_time,
+    head_measures,
+    kinetic_energy_of,
+    mechanical_action,
+    regional_summary,
+    write_action,
+)
+from replay.models import read_model
+from replay.stages.fidelity import skull_motion
+from replay.stages.frame import Stage, Workspace
+from replay.stages.verdict import limits_of
+
+
+def run(workspace: Workspace) -> str | None:
+    """Measure the replayed head; nothing here is an injury criterion or a verdict on a person."""
+    stage = Stage(workspace, "measures", after=["settings", "assembly", "replay", "sensitivity"])
+    if stage.stopped_by:
+        return stage.skip()
+    model = read_model(stage.read("assembly", "model.h5"))
+    energy = pd.read_csv(stage.read("replay", "part_energy.csv"))
+    brain = pd.read_csv(stage.read("replay", "brain_histories.csv"))
+    gate = read_gate(stage.read("sensitivity", "gate.json"), limits_of(stage))
+
+    time = energy["time_s"].unique()
+    head, helmet = (
+        mechanical_action(time, kinetic_energy_of(energy, [p.pid for p in model.parts if p.assembly == assembly]))
+        for assembly in ("head", "helmet")
+    )
+    write_action(stage.write("action.csv", "mechanical action of head and helmet", unit="J s"), time, head, helmet)
+    write_json(
+        stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
+        {
+            "statement": "process diagnostics; no statement on injury or on a player",
+            "head": head_measures(in_head_axes(skull_motion(stage)), file="replay/histories.csv"),
+            "brain": regional_summary(brain),
+            "brain_convergence_class": convergence_class(gate),
+            "action": {
+                "unit": "J s",
+                "head": float(head[-1]),
+                "helmet": float(helmet[-1]),
+                "crossover_time_s": crossover_time(time, head, helmet),
+                "impactor": None,
+                "note": "a driven head has no impactor: its action needs contact",
+            },
+        },
+    )
+    return stage.finish()
+
+
+def in_head_axes(motion: Motion) -> dict[str, np.ndarray]:
+    """Columns of the head-axis motion that `head_measures` takes."""
+    turn = Rotation.from_quat(motion.quaternion).inv()
+    out = {"time_s": motion.time_s}
+    for stem, vectors, unit in (
+        ("a_head", motion.acceleration_m_per_s2, "_m_per_s2"),
+        ("omega_head", motion.angular_velocity_rad_per_s, "_rad_per_s"),
+        ("alpha_head", motion.angular_acceleration_rad_per_s2, "_rad_per_s2"),
+    ):
+        local = turn.apply(vectors)
+        out |= {f"{stem}_{axis}{unit}": local[:, i] for i, axis in enumerate("xyz")}
+    return out

@@ -1,0 +1,119 @@
+"""From a model, a driver and a play's settings to what the solver is asked."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from replay.models import Model
+from replay.play import Play
+from replay.solver import Controls, Material, PrescribedMotion, Problem, SolverPart
+
+
+def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hourglass_factor: float = 1.0) -> Controls:
+    """Numerical settings of a run.
+
+    Parameters
+    ----------
+    play
+        Its ``solver`` block.
+    duration_s
+        Length of the run [s].
+    checkpoint_every_s
+        Wall-clock time between checkpoints [s]; changes no result.
+    hourglass_factor
+        Multiplies the hourglass coefficient (a half, for the sensitivity run).
+    """
+    settings = play.solver
+    return Controls(
+        termination_time_s=duration_s,
+        time_step_factor=settings.time_step_factor,
+        hourglass_method=settings.hourglass.method,
+        hourglass_coefficient=settings.hourglass.coefficient * hourglass_factor,
+        bulk_viscosity_quadratic=settings.bulk_viscosity.quadratic,
+        bulk_viscosity_linear=settings.bulk_viscosity.linear,
+        mass_scaling_time_step_s=settings.mass_scaling_time_step_s,
+        plot_interval_s=min(settings.plot_interval_s, duration_s),
+        history_interval_s=min(settings.history_interval_s, duration_s / 10.0),
+        checkpoint_period_s=checkpoint_every_s,
+    )
+
+
+def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Problem:
+    """Head and helmet with the skull driven along the play's motion.
+
+    The model stands at the driver's first pose and moves as one rigid body with its first velocity, so that
+    nothing is strained before the impact.
+
+    Parameters
+    ----------
+    model
+        In head axes, origin at the head's centre of gravity.
+    driver
+        Rows of ``driver_6dof.csv``: the motion of that centre, global axes.
+    controls
+        Numerical settings.
+    """
+    position = driver[["x_m", "y_m", "z_m"]].to_numpy()
+    quaternion = driver[["qx", "qy", "qz", "qw"]].to_numpy()
+    velocity = driver[["vx_m_per_s", "vy_m_per_s", "vz_m_per_s"]].to_numpy()
+    omega = driver[[f"omega_{axis}_rad_per_s" for axis in "xyz"]].to_numpy()
+    arms = Rotation.from_quat(quaternion[0]).apply(model.nodes)
+    parts = _parts(model, range(len(model.parts)))
+    return Problem(
+        nodes=position[0] + arms,
+        hexes=model.hexes,
+        element_part=model.element_part,
+        parts=parts,
+        controls=controls,
+        initial_velocity=velocity[0] + np.cross(omega[0], arms),
+        prescribed=PrescribedMotion(
+            pids=tuple(part.pid for part in parts if part.material.is_rigid),
+            times=driver["time_s"].to_numpy(),
+            positions=position,
+            quaternions=quaternion,
+            velocities=velocity,
+            angular_velocities=omega,
+        ),
+        node_ids=model.node_ids,
+        element_ids=model.element_ids,
+    )
+
+
+def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> tuple[Problem, np.ndarray]:
+    """The helmet alone in free flight along x (protocol 1.6).
+
+    Returns
+    -------
+    problem : Problem
+        Parts of the helmet only; nodes it shared with the head are free.
+    rows : (k,) int
+        Its elements, as rows of the model's.
+    """
+    rows = np.flatnonzero(model.elements_of(assembly="helmet"))
+    nodes, hexes = np.unique(model.hexes[rows], return_inverse=True)
+    kept, element_part = np.unique(model.element_part[rows], return_inverse=True)
+    velocity = np.zeros((len(nodes), 3))
+    velocity[:, 0] = speed_m_per_s
+    problem = Problem(
+        nodes=model.nodes[nodes],
+        hexes=hexes.reshape(-1, 8),
+        element_part=element_part,
+        parts=_parts(model, kept),
+        controls=controls,
+        initial_velocity=velocity,
+        node_ids=model.node_ids[nodes],
+        element_ids=model.element_ids[rows],
+    )
+    return problem, rows
+
+
+def _parts(model: Model, chosen: range | np.ndarray) -> tuple[SolverPart, ...]:
+    parts = []
+    for index in chosen:
+        part = model.parts[int(index)]
+        facts = model.materials[part.material]
+        material = Material(part.material, facts["law"], facts["density_kg_per_m3"], facts["parameters"])
+        parts.append(SolverPart(part.pid, part.name, material))
+    return tuple(parts)

@@ -1,0 +1,123 @@
+"""Stage ``replay``: the explicit run, its brain recorder, and the numerics gate."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from replay.errors import InstabilityError, ResumeError
+from replay.files import read_json
+from replay.gates import Gate, numerics_gate, part_energies
+from replay.measures import BrainRecorder
+from replay.models import Model, read_model
+from replay.motion import DRIVER
+from replay.solver import Problem, Recorder, solve
+from replay.stages.frame import Stage, Workspace
+from replay.stages.problem import controls_of, driven_problem
+from replay.stages.settings import read_settings
+from replay.stages.verdict import limits_of
+
+RUN_FILES = {
+    "run.json": "summary of the run",
+    "timestep.csv": "time step, controlling element and added mass",
+    "energy.csv": "energy ledger",
+    "part_energy.csv": "energy by part",
+    "histories.csv": "motion of parts",
+    "states.vtkhdf": "states of the whole mesh, for ParaView",
+    "states.xdmf": "the same for VisIt",
+}
+BRAIN_FILES = {
+    "brain_histories.csv": "strain and stress of the brain by region over time",
+    "element_peaks.csv": "peaks of every brain element",
+    "brain_snapshots.h5": "strain of every brain element over time",
+}
+# What an interrupted run leaves and a later one goes on from.
+UNFINISHED = ("checkpoint", "states.partial")
+
+
+def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 60.0) -> str | None:
+    """Replay the impact with the driven skull, going on from a checkpoint where there is one."""
+    stage = Stage(workspace, "replay", after=["settings", "assembly", "driver", "shake"], keep=UNFINISHED)
+    if stage.stopped_by:
+        return stage.skip()
+    refusal = run_driven(stage, threads=threads, checkpoint_every_s=checkpoint_every_s)
+    if refusal:
+        return refusal
+    gate = judge_numerics(stage)
+    gate.write(stage.write("gate.json", "gate: replay numerics"))
+    return stage.finish([gate])
+
+
+def run_driven(
+    stage: Stage, *, threads: int | None, checkpoint_every_s: float, hourglass_factor: float = 1.0
+) -> str | None:
+    """Run head and helmet along the play's driver in the stage's folder.
+
+    Returns
+    -------
+    str or None
+        Why the solver stopped itself, when it did; the stage is then finished.
+    """
+    play = read_settings(stage)
+    model = read_model(stage.read("assembly", "model.h5"))
+    driver = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
+    controls = controls_of(
+        play, play.window.duration_s, checkpoint_every_s=checkpoint_every_s, hourglass_factor=hourglass_factor
+    )
+    problem = driven_problem(model, driver, controls)
+    return run_solver(stage, problem, [brain_recorder(model)], {**RUN_FILES, **BRAIN_FILES}, threads=threads)
+
+
+def run_solver(
+    stage: Stage, problem: Problem, recorders: list[Recorder], files: dict[str, str], *, threads: int | None
+) -> str | None:
+    """Run a problem in the stage's folder and list its files; a run that stops itself ends the play."""
+    folder = stage.write_all(files)
+    try:
+        try:
+            solve(problem, folder, recorders=recorders, threads=threads)
+        except ResumeError as stale:
+            print(f"{stale}\n    starting anew: the checkpoint is of a run that was asked something else")
+            solve(problem, folder, recorders=recorders, threads=threads, resume=False)
+    except InstabilityError as error:
+        return stage.give_up(f"stopped by the solver's watch-dog: {error}")
+    return None
+
+
+def brain_recorder(model: Model) -> BrainRecorder:
+    """Recorder of the brain's elements with their regions."""
+    rows = np.flatnonzero(model.elements_of(role="brain"))
+    region = model.element_region[rows]
+    groups = {name: np.flatnonzero(region == k) for k, name in enumerate(model.region_names) if k > 0}
+    return BrainRecorder(rows, model.element_ids[rows], groups)
+
+
+def judge_numerics(stage: Stage) -> Gate:
+    """Judge the run whose files lie in the stage's folder."""
+    energy = pd.read_csv(stage.folder / "energy.csv")
+    steps = pd.read_csv(stage.folder / "timestep.csv")
+    parts = pd.read_csv(stage.folder / "part_energy.csv")
+    summary = read_json(stage.folder / "run.json")
+    model = read_model(stage.read("assembly", "model.h5"))
+    fluid = [part.pid for part in model.parts if model.materials[part.material]["law"] == "fluid"]
+    return numerics_gate(
+        {str(name): energy[name].to_numpy() for name in energy},
+        part_energies(parts, fluid),
+        {"ran_to_end": summary["ran_to_end"], **run_numbers(summary)},
+        limits_of(stage),
+        steps=steps["step"].to_numpy(),
+    )
+
+
+def run_numbers(summary: dict) -> dict[str, float | str]:
+    """What the numerics gate asks of ``run.json``."""
+    added, mass = summary["added_mass_by_part_kg"], summary["mass_by_part_kg"]
+    share = {name: added[name] / mass[name] for name in mass if mass[name] > 0}
+    worst = max(share, key=lambda name: share[name])
+    return {
+        "added_mass_share": summary["added_mass_kg"] / summary["mass_kg"],
+        "added_mass_part_share": share[worst],
+        "added_mass_part_share_detail": f"most in {worst}" if share[worst] > 0 else "",
+        "min_time_step_s": summary["smallest_time_step_s"],
+        "min_volume_ratio": summary["min_volume_ratio"],
+    }

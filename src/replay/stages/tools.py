@@ -1,0 +1,99 @@
+"""Commands that stand beside the chain of stages: looking at a result, making a play or a model."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from replay import bundle, models
+from replay.errors import InputError
+from replay.files import read_json, write_text
+from replay.gates import Limits, read_gate
+from replay.play import play_schema_text
+from replay.stages.verdict import GATE_FILES
+
+_COLOURS = {"pass": "32", "warn": "33", "fail": "31", "not reached": "90"}
+
+
+def show_verdict(results: Path) -> int:
+    """Print the verdict of a run, every gate, and where its page and bundle are.
+
+    Returns
+    -------
+    int
+        0 when accepted, 3 when rejected.
+    """
+    path = results / "verdict" / "verdict.json"
+    if not path.is_file():
+        raise InputError(path, "there is no verdict here", mend=f"run `make run PLAY={results.name}` first")
+    verdict = read_json(path)
+    limits = Limits.load()
+    found = {}
+    for stage, files in {**GATE_FILES, "verdict": ("gate.json",)}.items():
+        for file in files:
+            if (results / stage / file).is_file():
+                gate = read_gate(results / stage / file, limits)
+                found[gate.name] = gate
+    print(f"\n{results.name}: {verdict['status'].upper()}\n")
+    for name, facts in limits.gates.items():
+        gate = found.get(name)
+        word = gate.verdict if gate else "not reached"
+        print(f"  {_coloured(word):<20} {facts.title} [{name}]")
+        for check in gate.causes() if gate else ():
+            print(f"      {check.verdict:<8} {check.sentence()}")
+    for entry in verdict["loosened"]:
+        print(f"  LOOSENED {entry['gate']}.{entry['check']}: {entry['limit']} instead of {entry['instead_of']}")
+    page, archive = results / "report" / "report.html", results / "bundle" / f"{results.name}.zip"
+    print()
+    for label, file in (("report", page), ("bundle", archive)):
+        if file.is_file():
+            print(f"  {label}: {file}")
+    print("\n  These are process diagnostics: no statement on injury or on a player.")
+    return 3 if verdict["status"] == "rejected" else 0
+
+
+def _coloured(word: str) -> str:
+    return f"\033[{_COLOURS[word]}m{word}\033[0m" + " " * (11 - len(word)) if sys.stdout.isatty() else word
+
+
+def verify_bundle(path: Path) -> int:
+    """Verify a bundle and say what was verified; a bad one raises, naming its first bad file."""
+    print(bundle.verify(path).text())
+    return 0
+
+
+def compare_bundles(old: Path, new: Path) -> int:
+    """Compare two runs; 0 when they agree, each artifact by its class."""
+    comparison = bundle.compare(old, new)
+    print(comparison.text())
+    return 0 if comparison.agree else 1
+
+
+def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
+    """Write one of the synthetic plays into a new folder."""
+    from replay.motion import synthetic
+
+    if into.exists() and any(into.iterdir()):
+        raise InputError(into, "the folder is not empty", mend="name a new folder")
+    synthetic.write_play(kind, into, seed=seed)
+    print(f"{into}: {kind} play with its truth; run it with `make run PLAY={into.name} PLAYS={into.parent}`")
+    return 0
+
+
+def write_model_file(preset: str, resolution: str, out: Path, preview: Path | None) -> int:
+    """Build a model by itself, print its tables and write it."""
+    model = models.build_model(preset, resolution)
+    models.write_model(out, model)
+    print(models.summary_text(model))
+    if preview is not None:
+        models.write_preview(preview, model)
+    return 0
+
+
+def write_schema(out: Path | None) -> int:
+    """Print or write the JSON schema of play.yaml."""
+    if out is None:
+        sys.stdout.write(play_schema_text())
+    else:
+        write_text(out, play_schema_text())
+    return 0
