@@ -58,7 +58,7 @@ class CubeLattice:
     @property
     def quad_centres(self) -> np.ndarray:
         """Centres of the surface quads on the cube, (q, 3); one coordinate is exactly +-1."""
-        return self.surface_cube[self.quads].mean(axis=1)
+        return np.round(self.surface_cube[self.quads].mean(axis=1), 9)
 
     def mirrored(self) -> np.ndarray:
         """Surface point that is the image of each across the plane y = 0, (s,)."""

@@ -187,3 +187,17 @@ def steepest_slope(surface: RadialSurface) -> float:
     d = lattice.directions
     angle = np.arccos(np.clip(np.einsum("qik,qik->qi", d[a], d[b]), -1, 1))
     return float(np.max(np.abs(logs[a] - logs[b]) / angle))
+
+
+def ray_stretch(surface: RadialSurface, directions: np.ndarray) -> np.ndarray:
+    """Length along the ray of a unit of thickness along the normal, (n,): ``sqrt(1 + (d ln r / d theta)^2)``."""
+    helper = np.where(np.abs(directions[:, 2:]) < 0.7, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(helper, directions)
+    first /= np.sqrt(np.einsum("ij,ij->i", first, first))[:, None]
+    second = np.cross(directions, first)
+    step, squares = 1e-3, np.zeros(len(directions))
+    for tangent in (first, second):
+        ahead = directions * np.cos(step) + tangent * np.sin(step)
+        behind = directions * np.cos(step) - tangent * np.sin(step)
+        squares += (np.log(surface(ahead) / surface(behind)) / (2 * step)) ** 2
+    return np.sqrt(1 + squares)

@@ -1,0 +1,240 @@
+"""The model from a preset and a resolution: mesh, parts, sets, densities, regions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from replay.models.cubed_sphere import cube_lattice
+from replay.models.facemask import facemask_mesh
+from replay.models.guard import relocate_worst_nodes
+from replay.models.head_shape import HeadPreset, head_preset, load_data
+from replay.models.helmet import helmet_mesh
+from replay.models.helmet_layout import PADS, helmet_layout
+from replay.models.mass import mass_properties
+from replay.models.materials import MATERIAL_OF_ROLE, load_materials
+from replay.models.model import Model, Part
+from replay.models.ogrid import RESOLUTIONS, TISSUES, head_mesh
+from replay.models.quality import hex_volumes
+from replay.models.regions import REGION_NAMES, label_regions
+
+HEAD_PART_IDS = {"brain": 60000001, "csf": 60000002, "skull": 60000003, "scalp": 60009020}
+PID_BLOCKS = {"head": (60_000_000, 69_999_999), "helmet": (10_000_000, 19_999_999)}
+SET_IDS = {
+    "H1_pads_set1": 10000099,
+    "H1_pads_set2": 10000100,
+    "all_parts": 99,
+    "helmet_1": 10000098,
+    "head_1": 60000098,
+    "skull": 60000099,
+}
+NOTES = (
+    "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
+    "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
+    "straps are not modelled; their anchors are node sets",
+    "shell and skull are one hex thick: bending of the shell is carried by hourglass stiffness",
+    "head surfaces are analytic (ellipsoids), not a person's anatomy",
+)
+_QUALITY_TARGET = 0.30
+
+
+def build_model(
+    preset: str = "nfl", resolution: str = "coarse", helmet_mass_kg: float | None = None, *, helmet: bool = True
+) -> Model:
+    """Build head and helmet.
+
+    Parameters
+    ----------
+    preset
+        ``anat``, ``nfl`` or ``article``.
+    resolution
+        ``tiny`` or ``coarse``.
+    helmet_mass_kg
+        Mass of the physical helmet [kg]; the preset's where None.
+    helmet
+        False for a bare head.
+
+    Returns
+    -------
+    Model
+        In the head frame, origin at the head's centre of gravity.
+
+    Raises
+    ------
+    ValueError
+        For an unknown preset or resolution, or a mass that is not positive.
+    """
+    if resolution not in RESOLUTIONS:
+        message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
+        raise ValueError(message)
+    head = head_preset(preset)
+    target = head.helmet_mass_kg if helmet_mass_kg is None else float(helmet_mass_kg)
+    if not target > 0:
+        message = f"a helmet of {target} kg"
+        raise ValueError(message)
+    nodes, hexes, names, mounts, cup = _mesh(head, resolution, helmet)
+    nodes, moved = relocate_worst_nodes(nodes, hexes, target=_QUALITY_TARGET)
+    parts = tuple(part for part in part_table() if part.name in set(names.tolist()))
+    index = {part.name: k for k, part in enumerate(parts)}
+    element_part = np.array([index[name] for name in names.tolist()], dtype=np.int32)
+    order = np.argsort(element_part, kind="stable")
+    hexes, element_part = hexes[order], element_part[order]
+    regions = np.zeros(len(hexes), dtype=np.int32)
+    in_brain = element_part == index["brain"]
+    regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
+    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target)
+    density = np.array([materials[part.material]["density_kg_per_m3"] for part in parts])[element_part]
+    in_head = np.array([part.assembly == "head" for part in parts])[element_part]
+    cg = mass_properties(nodes, hexes[in_head], density[in_head]).cg_m
+    cg[1] = 0.0  # the head is symmetric; the sum of its elements only nearly so
+    sets, set_ids = _part_sets(parts)
+    return Model(
+        nodes=nodes - cg,
+        node_ids=_numbers(hexes, in_head, len(nodes)),
+        hexes=hexes.astype(np.int32),
+        element_ids=_element_ids(in_head),
+        element_part=element_part,
+        element_region=regions,
+        parts=parts,
+        region_names=REGION_NAMES,
+        part_sets=sets,
+        part_set_ids=set_ids,
+        materials=materials,
+        node_sets=_node_sets(nodes, mounts, cup, hexes, element_part, index),
+        info={
+            "preset": preset,
+            "preset_title": head.title,
+            "resolution": resolution,
+            "star_centre_m": [float(v) for v in -cg],
+            "tragion_m": [float(v) for v in np.array(head.surfaces.tragion_m) - cg],
+            "atlas_centre_mm": list(head.surfaces.atlas_centre_mm),
+            "atlas_mm_per_m": list(head.surfaces.atlas_mm_per_m),
+            "helmet_mass_target_kg": target if helmet else None,
+            "calibration": calibration,
+            "guard_moved_nodes": int(moved),
+            "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
+            "notes": list(NOTES),
+        },
+    )
+
+
+def part_table() -> tuple[Part, ...]:
+    """Every part the builder knows, with its number."""
+    ids = load_data("helmet.yaml")["part_ids"]
+    parts = [Part(pid, name, name, "head", MATERIAL_OF_ROLE[name]) for name, pid in HEAD_PART_IDS.items()]
+    for role in ("shell", "facemask"):
+        parts.append(Part(ids[role], role, role, "helmet", MATERIAL_OF_ROLE[role]))
+    for role in ("comfort_pad", "energy_pad"):
+        parts += [Part(ids[role][pad], f"{role}_{pad}", role, "helmet", MATERIAL_OF_ROLE[role]) for pad in PADS]
+    parts.append(Part(ids["chin_cup"], "chin_cup", "chin_cup", "helmet", MATERIAL_OF_ROLE["chin_cup"]))
+    return tuple(parts)
+
+
+def _mesh(
+    head: HeadPreset, resolution: str, with_helmet: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, np.ndarray], np.ndarray]:
+    """Nodes, hexes, part name of each hex, mounts, outer nodes of the chin cup."""
+    setting, helmet = RESOLUTIONS[resolution], load_data("helmet.yaml")
+    lattice = cube_lattice(setting.divisions)
+    layout = helmet_layout(lattice, helmet)
+    inner = head_mesh(lattice, head.surfaces, setting, layout.directions, head.least_thickness_m)
+    names = np.array(TISSUES)[inner.tissue].astype("U32")
+    if not with_helmet:
+        return inner.nodes, inner.hexes, names, {}, np.zeros(0, dtype=int)
+    outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet)
+    mask = facemask_mesh(outer.nodes, outer.edge_quads, head.surfaces.scalp, helmet, setting.facemask_step_m)
+    names = np.concatenate([names, outer.part, np.full(len(mask.hexes), "facemask")])
+    cup = np.setdiff1d(outer.hexes[outer.part == "chin_cup"], inner.scalp_nodes)
+    return mask.nodes, np.vstack([inner.hexes, outer.hexes, mask.hexes]), names, mask.mounts, cup
+
+
+def _calibrated(
+    nodes: np.ndarray,
+    hexes: np.ndarray,
+    element_part: np.ndarray,
+    parts: tuple[Part, ...],
+    head: HeadPreset,
+    helmet_mass_kg: float,
+) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, float]]]:
+    """Densities that give every head part its mass and the helmet its own; the state before and after.
+
+    Each tissue is scaled to its own mass (what faceting and the ellipsoids' fit lack); the helmet's parts by one
+    factor, which leaves its centre of gravity where the nominal densities put it and stands for the hardware, straps
+    and paint that are not meshed.
+    """
+    volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
+    library = load_materials()
+    nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
+    before = volume * nominal
+    of_helmet = np.array([p.assembly == "helmet" for p in parts])
+    factor = np.ones(len(parts))
+    for k, part in enumerate(parts):
+        if part.assembly == "head":
+            factor[k] = head.part_mass_kg[part.role] / before[k]
+    if of_helmet.any():
+        factor[of_helmet] = helmet_mass_kg / before[of_helmet].sum()
+    materials: dict[str, dict[str, Any]] = {}
+    for k, part in enumerate(parts):
+        material = dict(library[part.material])
+        material["density_nominal_kg_per_m3"] = float(nominal[k])
+        material["density_kg_per_m3"] = float(nominal[k] * factor[k])
+        materials.setdefault(part.material, material)
+    calibration = {
+        part.name: {
+            "volume_m3": float(volume[k]),
+            "mass_before_kg": float(before[k]),
+            "density_factor": float(factor[k]),
+            "mass_after_kg": float(before[k] * factor[k]),
+        }
+        for k, part in enumerate(parts)
+    }
+    return materials, calibration
+
+
+def _part_sets(parts: tuple[Part, ...]) -> tuple[dict[str, tuple[int, ...]], dict[str, int]]:
+    chosen = {
+        "H1_pads_set1": [p.pid for p in parts if p.role == "comfort_pad"],
+        "H1_pads_set2": [p.pid for p in parts if p.role == "energy_pad"],
+        "all_parts": [p.pid for p in parts],
+        "helmet_1": [p.pid for p in parts if p.assembly == "helmet"],
+        "head_1": [p.pid for p in parts if p.assembly == "head"],
+        "skull": [p.pid for p in parts if p.role == "skull"],
+    }
+    sets = {name: tuple(sorted(pids)) for name, pids in chosen.items() if pids}
+    return sets, {name: SET_IDS[name] for name in sets}
+
+
+def _numbers(hexes: np.ndarray, in_head: np.ndarray, count: int) -> np.ndarray:
+    """Node numbers: the head's from 60,000,001, the helmet's own from 10,000,001."""
+    of_head = np.zeros(count, dtype=bool)
+    of_head[hexes[in_head]] = True
+    return np.where(of_head, 60_000_000 + np.cumsum(of_head), 10_000_000 + np.cumsum(~of_head)).astype(np.int64)
+
+
+def _element_ids(in_head: np.ndarray) -> np.ndarray:
+    return np.where(in_head, 60_000_000 + np.cumsum(in_head), 10_000_000 + np.cumsum(~in_head)).astype(np.int64)
+
+
+def _node_sets(
+    nodes: np.ndarray,
+    mounts: dict[str, np.ndarray],
+    cup: np.ndarray,
+    hexes: np.ndarray,
+    element_part: np.ndarray,
+    index: dict[str, int],
+) -> dict[str, np.ndarray]:
+    """Mounts of the facemask, and where the chin strap goes: outer corners of the cup, lower edge of the shell."""
+    if "shell" not in index:
+        return {}
+    sets = {f"facemask_mount_{name}": rows for name, rows in mounts.items()}
+    shell = np.unique(hexes[element_part == index["shell"]])
+    for side, sign in (("left", 1), ("right", -1)):
+        sets[f"chin_cup_strap_{side}"] = cup[[_furthest(nodes[cup], np.array([0.0, sign, 0.0]))]]
+        for name, direction in (("front", [1.0, sign, -1.2]), ("rear", [-0.3, sign, -1.2])):
+            sets[f"strap_anchor_{name}_{side}"] = shell[[_furthest(nodes[shell], np.array(direction))]]
+    return {name: np.sort(rows).astype(np.int32) for name, rows in sets.items()}
+
+
+def _furthest(points: np.ndarray, direction: np.ndarray) -> int:
+    return int(np.argmax(np.round(np.einsum("ij,j->i", points, direction), 9)))

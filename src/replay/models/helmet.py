@@ -1,0 +1,132 @@
+"""The helmet's hexes: comfort pads on the scalp, energy pads, shell, chin cup, in the columns of the lattice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from replay.models.cubed_sphere import CubeLattice
+from replay.models.helmet_layout import PADS, HelmetLayout, boundary_edges
+from replay.models.ogrid import HeadMesh, Resolution
+from replay.models.radial import RadialSurface, Smoothed, ray_stretch
+
+
+@dataclass(frozen=True)
+class HelmetMesh:
+    """Hexes of a helmet that stands on a head's scalp nodes.
+
+    Parameters
+    ----------
+    nodes
+        Nodes of head and helmet, the head's first, (n, 3) [m].
+    hexes
+        Hexes of the helmet alone, rows of `nodes`, (m, 8).
+    part
+        Name of each hex's part, (m,) of ``comfort_pad_front``, ``energy_pad_front``, ``shell``, ``chin_cup``.
+    edge_quads
+        Faces along the shell's lower edge, (k, 4) rows of `nodes`: inner a, inner b, outer b, outer a.
+    """
+
+    nodes: np.ndarray
+    hexes: np.ndarray
+    part: np.ndarray
+    edge_quads: np.ndarray
+
+
+def helmet_surface(scalp: RadialSurface, helmet: dict[str, Any]) -> RadialSurface:
+    """The smoothed scalp from which a helmet's layers are offset."""
+    return Smoothed(scalp, float(helmet["liner_smoothing_deg"]))
+
+
+def helmet_mesh(
+    lattice: CubeLattice,
+    layout: HelmetLayout,
+    head: HeadMesh,
+    scalp: RadialSurface,
+    resolution: Resolution,
+    helmet: dict[str, Any],
+) -> HelmetMesh:
+    """Stand pads and shell on the scalp.
+
+    Until contact exists the pads share the scalp's nodes, and the chin cup too. Between pads a column is empty from
+    scalp to shell.
+
+    Parameters
+    ----------
+    lattice, layout
+        The lattice and what its columns carry.
+    head
+        The head.
+    scalp
+        The scalp's surface.
+    resolution
+        Layers of comfort and energy pads.
+    helmet
+        ``data/helmet.yaml``.
+    """
+    d = layout.directions
+    skin = head.nodes[head.scalp_nodes]
+    thickness = helmet["thickness_m"]
+    liner = helmet_surface(scalp, helmet)
+    base = np.maximum(liner(d), np.sqrt(np.einsum("ij,ij->i", skin, skin)))
+    stretch = ray_stretch(liner, d)
+    builder = _Builder(head.nodes, lattice.quads)
+    levels = [head.scalp_nodes]
+    start = np.sqrt(np.einsum("ij,ij->i", skin, skin))
+    for name, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy), ("shell", 1)):
+        base = base + stretch * thickness[name]
+        for step in range(1, layers + 1):
+            radius = start + (base - start) * (step / layers)
+            levels.append(builder.level(d * radius[:, None]))
+        start = base
+    level = 0
+    padded = layout.pad >= 0
+    for role, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy)):
+        names = np.array([f"{role}_{name}" for name in PADS])
+        for _ in range(layers):
+            builder.extrude(levels[level], levels[level + 1], padded, names[layout.pad[padded]])
+            level += 1
+    builder.extrude(levels[level], levels[level + 1], layout.shell, np.full(layout.shell.sum(), "shell"))
+    rim = boundary_edges(lattice.quads[layout.shell])
+    inner, outer = levels[level], levels[level + 1]
+    edge_quads = np.stack([inner[rim[:, 0]], inner[rim[:, 1]], outer[rim[:, 1]], outer[rim[:, 0]]], axis=1)
+    reach = ray_stretch(scalp, d) * helmet["chin"]["thickness_m"]
+    cup = builder.level(skin + d * reach[:, None])
+    builder.extrude(levels[0], cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+    return builder.finish(edge_quads)
+
+
+class _Builder:
+    """Collects sheets of nodes and the hexes between them, and drops the nodes that no hex uses."""
+
+    def __init__(self, head_nodes: np.ndarray, quads: np.ndarray) -> None:
+        self._head = len(head_nodes)
+        self._sheets = [head_nodes]
+        self._count = len(head_nodes)
+        self._quads = quads
+        self._hexes: list[np.ndarray] = []
+        self._parts: list[np.ndarray] = []
+
+    def level(self, points: np.ndarray) -> np.ndarray:
+        """Add a sheet of nodes, one per surface point; return its rows."""
+        rows = self._count + np.arange(len(points))
+        self._sheets.append(points)
+        self._count += len(points)
+        return rows
+
+    def extrude(self, inner: np.ndarray, outer: np.ndarray, chosen: np.ndarray, names: np.ndarray) -> None:
+        """Add the hexes between two sheets over the chosen quads."""
+        quads = self._quads[chosen]
+        self._hexes.append(np.hstack([inner[quads], outer[quads]]))
+        self._parts.append(names)
+
+    def finish(self, edge_quads: np.ndarray) -> HelmetMesh:
+        """Number the nodes that are used, the head's unchanged."""
+        nodes, hexes = np.vstack(self._sheets), np.vstack(self._hexes)
+        used = np.zeros(len(nodes), dtype=bool)
+        used[: self._head] = True
+        used[hexes] = True
+        number = np.cumsum(used) - 1
+        return HelmetMesh(nodes[used], number[hexes], np.concatenate(self._parts), number[edge_quads])
