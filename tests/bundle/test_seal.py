@@ -113,7 +113,7 @@ def test_actions_carry_what_was_read_and_made_and_when(sealed):
     action = entities["#run-driver"]
     assert action["startTime"] == "2023-11-14T22:13:20+00:00"
     assert action["description"] == "replay driver demo --results results"
-    assert action["object"] == [{"@id": "results/reconstruction/kinematics.csv"}]
+    assert action["object"] == {"@id": "results/reconstruction/kinematics.csv"}
     made = {e["@id"] for e in action["result"]}
     assert made == {"results/driver/driver_6dof.csv", "results/driver/manifest.json"}
     assert "startTime" not in entities["#run-decks"]

@@ -168,8 +168,8 @@ def _add_run(
         _stamp(action, jobs.get(stage))
         action["instrument"] = tool
         read = {f"results/{i.path}" for i in manifest.inputs} | {f"plays/{run.play}/{i.path}" for i in manifest.inputs}
-        action["object"] = [files[path] for path in sorted(read) if path in files] or [files[about.config]]
-        action["result"] = [file for path, file in files.items() if path.startswith(f"results/{stage}/")]
+        action["object"] = _compact([files[path] for path in sorted(read) if path in files] or [files[about.config]])
+        action["result"] = _compact([file for path, file in files.items() if path.startswith(f"results/{stage}/")])
         control = add(f"#control-{stage}", "ControlAction", f"orchestrate {stage}")
         control["instrument"], control["object"] = step, action
         tools.append(tool)
@@ -188,6 +188,11 @@ def _add_run(
         _stamp(whole, span)
         _stamp(organize, span)
     return [whole, organize, *actions]
+
+
+def _compact(entities: list[Any]) -> Any:
+    """Write a single value as itself, as RO-Crate recommends."""
+    return entities[0] if len(entities) == 1 else entities
 
 
 def _outcome(failure: str | None) -> dict[str, str]:
