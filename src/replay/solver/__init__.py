@@ -1,0 +1,38 @@
+"""Explicit dynamics of one-point hexahedra.
+
+The solver takes arrays and returns arrays: a `Problem` of nodes, hexahedra, parts and `Controls` goes into
+`solve`, which writes tables and states to a folder and returns a `RunSummary`. It knows nothing
+of plays, heads or helmets. The physics is in `kernels`; docs/physics.md gives the equations.
+"""
+
+from replay.solver.kernels import source_hash
+from replay.solver.ledger import Energies
+from replay.solver.materials import LAWS, Material, law_parameters
+from replay.solver.outputs import ENERGY_TABLE, HISTORY_TABLE, PART_ENERGY_TABLE, TIME_STEP_TABLE
+from replay.solver.problem import Controls, PrescribedMotion, Problem, SolverPart, initial_velocity_about_axis
+from replay.solver.rigid import Pose, pose_at
+from replay.solver.run import RunSummary, solve
+from replay.solver.view import Recorder, StateView
+
+__all__ = [
+    "ENERGY_TABLE",
+    "HISTORY_TABLE",
+    "LAWS",
+    "PART_ENERGY_TABLE",
+    "TIME_STEP_TABLE",
+    "Controls",
+    "Energies",
+    "Material",
+    "Pose",
+    "PrescribedMotion",
+    "Problem",
+    "Recorder",
+    "RunSummary",
+    "SolverPart",
+    "StateView",
+    "initial_velocity_about_axis",
+    "law_parameters",
+    "pose_at",
+    "solve",
+    "source_hash",
+]

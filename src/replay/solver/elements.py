@@ -1,0 +1,102 @@
+"""The deformable elements of a run, law by law: their state, their masses, their forces."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.solver.kernels.element import Control
+from replay.solver.kernels.lanes import LANES, compile_law, reference_size, state_size
+from replay.solver.layout import BlockGroup, Layout
+from replay.solver.materials import LAWS, law_parameters
+from replay.solver.problem import Controls, Problem, gradients
+
+
+@cache
+def law_kernel(law: str) -> Any:
+    """Compiled element loop of a law."""
+    return compile_law(LAWS[law])
+
+
+def numerical_control(controls: Controls) -> Control:
+    """Coefficients of hourglass control and bulk viscosity for the kernels."""
+    stiff = controls.hourglass_method == "stiffness"
+    kappa = controls.hourglass_coefficient
+    return Control(
+        kappa if stiff else 0.0,
+        0.0 if stiff else kappa,
+        float(controls.bulk_viscosity_quadratic),
+        float(controls.bulk_viscosity_linear),
+    )
+
+
+class ElementGroup:
+    """Elements of one law.
+
+    Parameters
+    ----------
+    problem, layout, group
+        What to build.
+    buffer : (n_blocks_of_all, 24, LANES) float64
+        Nodal forces; this group writes its own blocks.
+
+    Attributes
+    ----------
+    stress, hourglass, state : (n_blocks, k, LANES) float64
+        Cauchy stress [Pa], hourglass forces [N], variables of the law.
+    mass : (n_blocks, LANES) float64
+        Element masses with added mass [kg].
+    step : (n_blocks, LANES) float64
+        Stable steps [s].
+    work : (n_blocks, 3) float64
+        Work of the last step [J].
+    """
+
+    def __init__(self, problem: Problem, layout: Layout, group: BlockGroup, buffer: NDArray[np.float64]) -> None:
+        law = LAWS[group.law]
+        self.group = group
+        self.law = law
+        blocks = len(group.fill)
+        corners = layout.node_row[problem.hexes[group.rows]]
+        self._connectivity = np.ascontiguousarray(corners.transpose(0, 2, 1)).astype(np.uint32)
+        gradient, volume = gradients(problem.nodes, problem.hexes[group.rows.ravel()])
+        reference = np.empty((blocks, reference_size(law), LANES))
+        reference[:, 0] = volume.reshape(blocks, LANES)
+        if law.TOTAL_FORM:
+            scaled = (gradient / volume[:, None]).reshape(blocks, LANES, 18)
+            reference[:, 1:] = scaled.transpose(0, 2, 1)
+        self._reference = reference
+        density = np.array([part.material.density_kg_per_m3 for part in problem.parts])[group.part]
+        self.mass = density[:, None] * reference[:, 0]
+        self.physical_mass = self.mass.copy()
+        used, self._row = np.unique(group.part, return_inverse=True)
+        constants = [law_parameters(problem.parts[k].material).constants() for k in used]
+        self._parameters = np.array(constants, dtype=float).reshape(len(used), law.N_CONSTANTS)
+        self.stress = np.ascontiguousarray(problem.initial_stress[group.rows].transpose(0, 2, 1))
+        self.hourglass = np.zeros((blocks, 12, LANES))
+        self.state = np.zeros((blocks, state_size(law), LANES))
+        self.force = buffer[group.first_block : group.first_block + blocks]
+        self.step = np.zeros((blocks, LANES))
+        self.work = np.zeros((blocks, 3))
+        self._control = numerical_control(problem.controls)
+        self._kernel = law_kernel(group.law)
+
+    def forces(self, nodal: NDArray[np.float64], dt: float) -> None:
+        """Bring the elements to the end of a step of length `dt` [s] and write their nodal forces."""
+        self._kernel(
+            nodal, self._connectivity, self.group.fill, self._row, self.mass, self._reference, self.stress,
+            self.hourglass, self.state, self._parameters, self._control, dt, self.force, self.step, self.work,
+        )  # fmt: skip
+
+    def scatter(self, values: NDArray[np.float64], into: NDArray[np.float64]) -> None:
+        """Write values of this group, (n_blocks, k, LANES) or (n_blocks, LANES), to the user's element rows."""
+        filled = self.group.filled
+        lanes = values if values.ndim == 2 else values.transpose(0, 2, 1)
+        into[self.group.rows[filled]] = lanes[filled]
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Everything that a step changes, by name, for a checkpoint."""
+        return {"stress": self.stress, "hourglass": self.hourglass, "state": self.state, "mass": self.mass}

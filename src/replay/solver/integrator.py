@@ -1,0 +1,198 @@
+"""Central differences: forces, kick, drift; the state of a run and nothing of its files.
+
+Positions and stresses live at times t_n, velocities half a step before or after. A step is
+
+    forces      elements come to t_n with the velocities that moved them there, and give f(t_n)
+    kick        v(n+1/2) = v(n-1/2) + (dt_before + dt_after)/2 M^-1 f(t_n)
+    drift       x(n+1) = x(n) + dt_after v(n+1/2)
+
+and the first kick takes half a step, so that the given velocities hold at time 0. Joints and
+contact have their place between forces and kick, and between kick and drift.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from replay.solver.elements import ElementGroup
+from replay.solver.kernels.assembly import CHUNK, RUNAWAYS, advance_nodes, drift_nodes, gather_forces
+from replay.solver.kernels.lanes import LANES, NODE_COLUMNS, POSITION, VELOCITY
+from replay.solver.layout import Layout, arrange
+from replay.solver.ledger import Energies, Ledger
+from replay.solver.problem import Problem, gradients
+from replay.solver.rigid import Bodies
+from replay.solver.time_step import AddedMass, StepBound, scale_masses, smallest_step
+
+
+class Integrator:
+    """A run between two steps.
+
+    Parameters
+    ----------
+    problem
+        Checked arrays and settings.
+    speed_limit_m_per_s
+        Nodes faster than this are counted by `kick`.
+
+    Attributes
+    ----------
+    nodal : (n, 8) float64
+        Positions [m] and velocities [m/s] in the solver's order.
+    time_s, step, dt_s
+        Present time [s], steps done, last step [s].
+    """
+
+    def __init__(self, problem: Problem, speed_limit_m_per_s: float) -> None:
+        self.problem = problem
+        self.layout: Layout = arrange(problem)
+        n, order = len(problem.nodes), self.layout.node_order
+        self.nodal = _aligned(n)
+        self.nodal[:, POSITION : POSITION + 3] = problem.nodes[order]
+        self.nodal[:, VELOCITY : VELOCITY + 3] = problem.initial_velocity[order]
+        self._buffer = np.zeros((max(self.layout.n_blocks, 1), 24, LANES))
+        self._flat = self._buffer.reshape(-1)
+        self.groups = [ElementGroup(problem, self.layout, g, self._buffer) for g in self.layout.groups]
+        self.added_mass: AddedMass = scale_masses(problem, self.groups, self.nodal)
+        self._lump()
+        self.bodies = Bodies(problem, self.layout, self.mass, self._soft_mass)
+        self.bodies.start(self.nodal)
+        self.speed_limit = speed_limit_m_per_s
+        self._sums = np.zeros(((self.layout.n_free + CHUNK - 1) // CHUNK, 4))
+        free = self.nodal[: self.layout.n_free, VELOCITY : VELOCITY + 3]
+        moving = 0.5 * float((self.mass[: self.layout.n_free] * (free**2).sum(axis=1)).sum())
+        self.ledger = Ledger(len(problem.parts), moving + self.bodies.kinetic(self.nodal))
+        self.time_s, self.step, self.dt_s = 0.0, 0, 0.0
+        self.runaways = 0
+        self._drifted = False
+        self._body_velocity = self._body_velocity_before = self.bodies.velocity.copy()
+
+    def _lump(self) -> None:
+        """Share element masses among their nodes; rigid elements count by their volume."""
+        problem, layout = self.problem, self.layout
+        element_mass = np.zeros(len(problem.hexes))
+        self.element_added_mass = np.zeros(len(problem.hexes))
+        for group in self.groups:
+            group.scatter(group.mass, element_mass)
+            group.scatter(group.mass - group.physical_mass, self.element_added_mass)
+        soft = _nodal_share(element_mass, problem, layout)
+        rigid = np.array([part.material.is_rigid for part in problem.parts])[problem.element_part]
+        if rigid.any():
+            density = np.array([part.material.density_kg_per_m3 for part in problem.parts])[problem.element_part[rigid]]
+            element_mass[rigid] = density * gradients(problem.nodes, problem.hexes[rigid])[1]
+        self.element_mass = element_mass
+        self.mass = _nodal_share(element_mass, problem, layout)
+        self._soft_mass = soft
+        self._added_mass = _nodal_share(self.element_added_mass, problem, layout)
+        order = layout.node_order
+        self._inverse_mass = np.where(problem.fixed[order], 0.0, 1.0 / self.mass[:, None])
+        gravity = np.asarray(problem.controls.gravity_m_per_s2, float)
+        self._external = problem.nodal_forces[order] + self.mass[:, None] * gravity
+
+    def forces(self) -> StepBound:
+        """Bring all elements to the present time; return the smallest stable step."""
+        for group in self.groups:
+            group.forces(self.nodal, self.dt_s)
+        return smallest_step(self.groups, self.ledger.part_work)
+
+    def kick(self, dt_next: float, *, drift: bool) -> None:
+        """Bring the velocities half a step past the present time.
+
+        Parameters
+        ----------
+        dt_next
+            Length of the coming step [s].
+        drift
+            Whether to move the nodes at once (`drift` finishes the step then), or later.
+        """
+        layout = self.layout
+        dt_kick = 0.5 * (self.dt_s + dt_next)
+        self._drifted = drift
+        advance_nodes(
+            self.nodal, layout.n_free, self._flat, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
+            self._external, dt_kick, dt_next if drift else 0.0, self.speed_limit, self._sums,
+        )  # fmt: skip
+        if self.bodies.count:
+            self._body_velocity_before = self.bodies.velocity.copy()
+            first, last = layout.n_free, len(self.nodal)
+            gather_forces(self._flat, layout.first_slot, layout.slot, first, last, self.bodies.inner)
+            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next)
+        self.runaways = int(self._sums[:, RUNAWAYS].sum())
+        self.ledger.advance(self._sums, self.bodies.sums)
+
+    def drift(self, dt_next: float, time_next: float) -> None:
+        """Move everything to the end of the step."""
+        first = self.layout.n_free if self._drifted else 0
+        drift_nodes(self.nodal, first, len(self.nodal), dt_next)
+        if self.bodies.count:
+            self.bodies.drift()
+        self.time_s, self.dt_s = time_next, dt_next
+        self.step += 1
+
+    def velocities(self) -> NDArray[np.float64]:
+        """Copy of the velocities as they stand, in the solver's order (n, 3) [m/s]."""
+        return self.nodal[:, VELOCITY : VELOCITY + 3].copy()
+
+    def present_velocities(self, before: NDArray[np.float64], dt_next: float) -> NDArray[np.float64]:
+        """Velocities at the present time, from those half a step before and, after `kick`, half a step past it."""
+        share = self.dt_s / (self.dt_s + dt_next)
+        self._body_velocity = self._body_velocity_before + share * (self.bodies.velocity - self._body_velocity_before)
+        return before + share * (self.nodal[:, VELOCITY : VELOCITY + 3] - before)
+
+    def mean_body_velocity(self, body: int) -> NDArray[np.float64]:
+        """Velocity of a free body's centre at the present time, after `present_velocities` [m/s]."""
+        return self._body_velocity[body]
+
+    def energies(self, velocities: NDArray[np.float64] | None = None) -> Energies:
+        """Ledger at the present time, after `kick`.
+
+        Parameters
+        ----------
+        velocities : (n, 3) float64, optional
+            At the present time, solver order; for the share of added mass.
+        """
+        added = 0.0
+        if velocities is not None and self.added_mass.total_kg > 0:
+            added = 0.5 * float((self._added_mass * (velocities**2).sum(axis=1)).sum())
+        return self.ledger.energies(added)
+
+    def user_order(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Bring nodal rows back to the user's order."""
+        return rows[self.layout.node_row]
+
+    def element_values(self, name: str, width: int) -> NDArray[np.float64]:
+        """State of all elements in the user's order, (m, width); zero for rigid ones."""
+        result = np.zeros((len(self.problem.hexes), width))
+        for group in self.groups:
+            group.scatter(getattr(group, name), result)
+        return result
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """Everything that a step changes, by name."""
+        result = {"nodal": self.nodal, "clock": np.array([self.time_s, self.dt_s, float(self.step)])}
+        for group in self.groups:
+            result |= {f"{group.group.law}.{name}": array for name, array in group.arrays().items()}
+        result |= {f"bodies.{name}": array for name, array in self.bodies.arrays().items()}
+        result |= {f"ledger.{name}": array for name, array in self.ledger.arrays().items()}
+        return result
+
+    def restore(self, arrays: dict[str, NDArray[np.float64]]) -> None:
+        """Go back to what `arrays` returned; the next call must be `forces`."""
+        for name, array in self.arrays().items():
+            if name not in ("clock",) and not name.startswith("ledger."):
+                array[...] = arrays[name]
+        self.ledger.restore({name[7:]: value for name, value in arrays.items() if name.startswith("ledger.")})
+        time, dt, step = arrays["clock"].tolist()
+        self.time_s, self.dt_s, self.step = time, dt, int(step)
+
+
+def _nodal_share(element_mass: NDArray[np.float64], problem: Problem, layout: Layout) -> NDArray[np.float64]:
+    rows = layout.node_row[problem.hexes].ravel()
+    return np.asarray(np.bincount(rows, np.repeat(element_mass / 8, 8), len(problem.nodes)), float)
+
+
+def _aligned(n: int) -> NDArray[np.float64]:
+    """Nodal array whose rows are cache lines."""
+    raw = np.zeros(n * NODE_COLUMNS + 8)
+    start = (-(raw.ctypes.data // 8)) % 8
+    return raw[start : start + n * NODE_COLUMNS].reshape(n, NODE_COLUMNS)

@@ -1,0 +1,5 @@
+"""The compiled physics of the solver; see `device` for how, `lanes` for the element loop."""
+
+from replay.solver.kernels.device import source_hash
+
+__all__ = ["source_hash"]

@@ -1,0 +1,18 @@
+"""Material laws, one file each: parameters, state layout, update, moduli.
+
+A law is a module with
+
+``NAME``
+    The word used in model files.
+``Parameters``
+    Frozen dataclass, units in the field names; ``constants()`` gives the numbers of the kernel.
+    It raises ``ValueError`` with a sentence for values that make no sense.
+``STATE``
+    Names of the state variables kept per element besides the stress; all start at zero.
+``TOTAL_FORM``
+    Whether the law looks at the deformation gradient.
+``update(motion, stress, state, dt, p)``
+    Scalar, branch-free; returns stress, state and `Moduli`.
+
+`replay.solver.materials` lists them; adding a law touches that list and nothing else.
+"""

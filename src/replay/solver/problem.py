@@ -1,0 +1,437 @@
+"""What the solver is asked to do: arrays and settings, checked once at the door."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from replay.errors import InputError
+from replay.solver.kernels.geometry import element_gradients
+from replay.solver.materials import Material, law_parameters
+
+WHERE = "solver problem"
+
+
+@dataclass(frozen=True)
+class SolverPart:
+    """A part: elements of one material that are listed together.
+
+    Parameters
+    ----------
+    pid
+        Number of the part.
+    name
+        For outputs and messages.
+    material
+        Of all its elements.
+    """
+
+    pid: int
+    name: str
+    material: Material
+
+
+@dataclass(frozen=True)
+class Controls:
+    """Numerical settings, the article's section 3 first.
+
+    Parameters
+    ----------
+    termination_time_s
+        End of the run [s].
+    time_step_factor
+        Share of the stable step that is used.
+    hourglass_method
+        ``stiffness`` (the article's method 4) or ``viscous``.
+    hourglass_coefficient
+        kappa in ``k = kappa 2 mu (B:B) / (16 V)`` for the stiffness form, or the usual coefficient of the
+        viscous form with the shear wave speed.
+    bulk_viscosity_quadratic, bulk_viscosity_linear
+        Bulk viscosity, in compression only.
+    mass_scaling_time_step_s
+        Elements whose step (times the factor) is below this get mass [s]; 0 turns it off.
+    gravity_m_per_s2
+        Acceleration of free fall.
+    plot_interval_s, history_interval_s
+        Times between states, and between rows of the histories [s].
+    checkpoint_period_s
+        Wall-clock time between checkpoints [s]; 0 leaves them to signals.
+    time_step_floor_s
+        A stable step below this stops the run [s].
+    speed_limit_m_per_s
+        A faster node stops the run [m/s]; 0 means ten times the fastest prescribed or initial
+        speed, or a tenth of the fastest wave where nothing moves at first.
+    """
+
+    termination_time_s: float
+    time_step_factor: float = 0.9
+    hourglass_method: str = "stiffness"
+    hourglass_coefficient: float = 0.10
+    bulk_viscosity_quadratic: float = 1.2
+    bulk_viscosity_linear: float = 0.06
+    mass_scaling_time_step_s: float = 1.92e-7
+    gravity_m_per_s2: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    plot_interval_s: float = 1e-3
+    history_interval_s: float = 1e-4
+    checkpoint_period_s: float = 60.0
+    time_step_floor_s: float = 1e-7
+    speed_limit_m_per_s: float = 0.0
+
+    def check(self) -> None:
+        """Refuse settings that make no sense.
+
+        Raises
+        ------
+        InputError
+            Naming the setting.
+        """
+        if self.hourglass_method not in ("stiffness", "viscous"):
+            raise InputError(
+                WHERE,
+                f"{self.hourglass_method!r} is no hourglass method",
+                column="controls.hourglass_method",
+                expected="stiffness or viscous",
+            )
+        for name in ("termination_time_s", "plot_interval_s", "history_interval_s"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise InputError(WHERE, f"it is {getattr(self, name)!r}", column=f"controls.{name}", expected="> 0")
+        if not 0 < self.time_step_factor <= 1:
+            raise InputError(
+                WHERE,
+                f"it is {self.time_step_factor!r}",
+                column="controls.time_step_factor",
+                expected="above 0, at most 1 (the stability limit)",
+            )
+        for name in (
+            "hourglass_coefficient", "bulk_viscosity_quadratic", "bulk_viscosity_linear", "mass_scaling_time_step_s",
+            "checkpoint_period_s", "time_step_floor_s", "speed_limit_m_per_s",
+        ):  # fmt: skip
+            if not 0 <= getattr(self, name) < math.inf:
+                raise InputError(WHERE, f"it is {getattr(self, name)!r}", column=f"controls.{name}", expected=">= 0")
+        if len(self.gravity_m_per_s2) != 3 or not np.isfinite(self.gravity_m_per_s2).all():
+            raise InputError(
+                WHERE, f"it is {self.gravity_m_per_s2!r}", column="controls.gravity_m_per_s2", expected="three numbers"
+            )
+
+
+@dataclass(frozen=True)
+class PrescribedMotion:
+    """Rigid parts driven as one body along a given 6-DOF motion.
+
+    A node of the body goes along ``X(t) = x(t) + R(t) R(0)^T (X(0) - x(0))``, where time 0 is the
+    start of the run; x by cubic Hermite interpolation, R by Hermite interpolation of the
+    quaternion.
+
+    Parameters
+    ----------
+    pids
+        Numbers of rigid parts.
+    times : (k,) float64
+        Increasing [s]; the first is at or before 0, the last at or after the end of the run.
+    positions, velocities : (k, 3) float64
+        Of the reference point [m], [m/s].
+    quaternions : (k, 4) float64
+        (x, y, z, w), body to space.
+    angular_velocities : (k, 3) float64
+        In space [rad/s].
+    """
+
+    pids: tuple[int, ...]
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    quaternions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    angular_velocities: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        times = _array(self.times, "prescribed.times", (None,))
+        k = len(times)
+        object.__setattr__(self, "pids", tuple(int(p) for p in self.pids))
+        object.__setattr__(self, "times", times)
+        for name, width in (("positions", 3), ("velocities", 3), ("angular_velocities", 3), ("quaternions", 4)):
+            object.__setattr__(self, name, _array(getattr(self, name), f"prescribed.{name}", (k, width)))
+        if k < 2 or (np.diff(times) <= 0).any():
+            raise InputError(
+                WHERE,
+                "the times do not increase",
+                column="prescribed.times",
+                expected="at least two times, each later than the one before",
+            )
+        size = np.linalg.norm(self.quaternions, axis=1)
+        if (abs(size - 1) > 1e-6).any():
+            row = int(np.argmax(abs(size - 1)))
+            raise InputError(
+                WHERE,
+                f"quaternion {row} has length {size[row]:.6g}",
+                column="prescribed.quaternions",
+                expected="unit quaternions (x, y, z, w)",
+            )
+        # neighbours on one side of the sphere: q and -q are one rotation, but their mean is not
+        turns = np.cumprod(np.where((self.quaternions[1:] * self.quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+        quaternions = self.quaternions / size[:, None]
+        quaternions[1:] *= turns[:, None]
+        object.__setattr__(self, "quaternions", quaternions)
+
+
+def _absent() -> NDArray[Any]:
+    """Stand in for an array that is not given."""
+    return np.empty(0)
+
+
+def _is_absent(value: Any) -> bool:
+    return value is None or np.shape(value) == (0,)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One run of the solver.
+
+    Parameters
+    ----------
+    nodes : (n, 3) float64
+        Coordinates [m].
+    hexes : (m, 8) int
+        Rows of `nodes`, order (-,-,-) (+,-,-) (+,+,-) (-,+,-) (-,-,+) (+,-,+) (+,+,+) (-,+,+).
+    element_part : (m,) int
+        Index into `parts`.
+    parts
+        Parts and their materials.
+    controls
+        Numerical settings.
+    initial_velocity : (n, 3) float64, optional
+        At time 0 [m/s]; rigid bodies take the momentum of their nodes. A driven body starts with its driver.
+    prescribed
+        Motion of the driven body.
+    node_ids, element_ids : (n,), (m,) int64, optional
+        Numbers in outputs and messages; 1, 2, ... by default.
+    fixed : (n, 3) bool, optional
+        Degrees of freedom that keep their initial velocity (zero: supports).
+    nodal_forces : (n, 3) float64, optional
+        Loads from time 0 on [N].
+    initial_stress : (m, 6) float64, optional
+        Cauchy stress xx, yy, zz, xy, yz, zx at time 0 [Pa]; only for laws in rate form.
+
+    Raises
+    ------
+    InputError
+        With the node, element or part that cannot be used.
+    """
+
+    nodes: NDArray[np.float64]
+    hexes: NDArray[np.int64]
+    element_part: NDArray[np.int64]
+    parts: tuple[SolverPart, ...]
+    controls: Controls
+    initial_velocity: NDArray[np.float64] = field(default_factory=_absent)
+    prescribed: PrescribedMotion | None = None
+    node_ids: NDArray[np.int64] = field(default_factory=_absent)
+    element_ids: NDArray[np.int64] = field(default_factory=_absent)
+    fixed: NDArray[np.bool_] = field(default_factory=_absent)
+    nodal_forces: NDArray[np.float64] = field(default_factory=_absent)
+    initial_stress: NDArray[np.float64] = field(default_factory=_absent)
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        nodes = _array(self.nodes, "nodes", (None, 3))
+        n = len(nodes)
+        put(self, "nodes", nodes)
+        put(self, "hexes", _integers(self.hexes, "hexes", (None, 8)))
+        m = len(self.hexes)
+        put(self, "element_part", _integers(self.element_part, "element_part", (m,)))
+        put(self, "parts", tuple(self.parts))
+        numbers = np.arange(1, n + 1) if _is_absent(self.node_ids) else self.node_ids
+        put(self, "node_ids", _integers(numbers, "node_ids", (n,)))
+        numbers = np.arange(1, m + 1) if _is_absent(self.element_ids) else self.element_ids
+        put(self, "element_ids", _integers(numbers, "element_ids", (m,)))
+        for name, shape in (("initial_velocity", (n, 3)), ("nodal_forces", (n, 3)), ("initial_stress", (m, 6))):
+            value = getattr(self, name)
+            put(self, name, np.zeros(shape) if _is_absent(value) else _array(value, name, shape))
+        fixed = np.zeros((n, 3), bool) if _is_absent(self.fixed) else np.array(self.fixed, dtype=bool)
+        if fixed.shape != (n, 3):
+            raise InputError(WHERE, f"its shape is {fixed.shape}", column="fixed", expected=f"({n}, 3)")
+        put(self, "fixed", fixed)
+        self._check()
+
+    def _check(self) -> None:
+        self.controls.check()
+        n = len(self.nodes)
+        if not len(self.hexes):
+            raise InputError(WHERE, "there is no element", column="hexes")
+        if self.hexes.min() < 0 or self.hexes.max() >= n:
+            row = int(np.argmax(((self.hexes < 0) | (self.hexes >= n)).any(axis=1)))
+            raise InputError(
+                WHERE,
+                f"element {self.element_ids[row]} names a node row that does not exist",
+                column="hexes",
+                expected=f"rows 0 to {n - 1}",
+            )
+        if self.element_part.min() < 0 or self.element_part.max() >= len(self.parts):
+            raise InputError(
+                WHERE,
+                "an element belongs to a part that does not exist",
+                column="element_part",
+                expected=f"indices 0 to {len(self.parts) - 1}",
+            )
+        for name in ("node_ids", "element_ids"):
+            values, counts = np.unique(getattr(self, name), return_counts=True)
+            if (counts > 1).any():
+                raise InputError(WHERE, f"{values[np.argmax(counts)]} occurs twice", column=name)
+        pids = [part.pid for part in self.parts]
+        if len(set(pids)) < len(pids):
+            raise InputError(WHERE, f"a part number occurs twice in {pids}", column="parts")
+        lonely = np.ones(n, bool)
+        lonely[self.hexes] = False
+        if lonely.any():
+            raise InputError(
+                WHERE,
+                f"node {self.node_ids[np.argmax(lonely)]} belongs to no element and has no mass",
+                column="nodes",
+                mend="remove it",
+            )
+        _, volume = gradients(self.nodes, self.hexes)
+        if not (volume > 0).all():
+            row = int(np.argmax(~(volume > 0)))
+            raise InputError(
+                WHERE,
+                f"element {self.element_ids[row]} of part {self.part_of(row).name!r} has volume {volume[row]:.3g} m^3",
+                column="hexes",
+                expected="positive volumes",
+                mend="its nodes are out of order, or the element is collapsed",
+            )
+        for part in self.parts:
+            law_parameters(part.material)
+        self._check_motion()
+
+    def _check_motion(self) -> None:
+        rigid = np.array([part.material.is_rigid for part in self.parts])
+        if (self.initial_stress[rigid[self.element_part]] != 0).any():
+            raise InputError(WHERE, "a rigid part has an initial stress", column="initial_stress")
+        if self.prescribed is None:
+            return
+        known = {part.pid: part for part in self.parts}
+        for pid in self.prescribed.pids:
+            if pid not in known:
+                raise InputError(
+                    WHERE,
+                    f"part {pid} does not exist",
+                    column="prescribed.pids",
+                    expected=", ".join(map(str, sorted(known))),
+                )
+            if not known[pid].material.is_rigid:
+                raise InputError(
+                    WHERE,
+                    f"part {pid} ({known[pid].name!r}) deforms",
+                    column="prescribed.pids",
+                    expected="parts of the law 'rigid'",
+                )
+        if not self.prescribed.pids:
+            raise InputError(WHERE, "no part is driven", column="prescribed.pids", expected="at least one part")
+        times, end = self.prescribed.times, self.controls.termination_time_s
+        if times[0] > 1e-12 * end or times[-1] < end * (1 - 1e-9):
+            raise InputError(
+                WHERE,
+                f"the motion is known from {times[0]:.6g} to {times[-1]:.6g} s, the run lasts from 0 to {end:.6g} s",
+                column="prescribed.times",
+                mend="shorten the run or extend the motion",
+            )
+
+    def part_of(self, row: int) -> SolverPart:
+        """Part of the element in one row."""
+        return self.parts[int(self.element_part[row])]
+
+    def digest(self) -> str:
+        """SHA-256 of everything that the result depends on."""
+        total = hashlib.sha256()
+
+        def feed(value: Any) -> None:
+            if isinstance(value, np.ndarray):
+                total.update(f"{value.dtype.str}{value.shape}".encode() + np.ascontiguousarray(value).tobytes())
+            elif isinstance(value, Material):
+                feed((value.name, value.law, value.density_kg_per_m3, sorted(dict(value.parameters).items())))
+            elif dataclasses.is_dataclass(value):
+                for f in dataclasses.fields(value):
+                    if f.name != "checkpoint_period_s":  # when a checkpoint is written changes no result
+                        total.update(f.name.encode())
+                        feed(getattr(value, f.name))
+            elif isinstance(value, list | tuple):
+                total.update(f"[{len(value)}".encode())
+                for item in value:
+                    feed(item)
+            elif isinstance(value, float | np.floating):
+                total.update(float(value).hex().encode() + b";")
+            else:
+                total.update(repr(value).encode() + b";")
+
+        feed(self)
+        return total.hexdigest()
+
+
+def gradients(coordinates: NDArray[np.float64], hexes: NDArray[np.int64]) -> tuple[NDArray, NDArray]:
+    """Modal gradients (m, 18) [m^2] and volumes (m,) [m^3] of elements."""
+    result, volume = np.empty((len(hexes), 18)), np.empty(len(hexes))
+    element_gradients(np.ascontiguousarray(coordinates), np.ascontiguousarray(hexes), result, volume)
+    return result, volume
+
+
+def initial_velocity_about_axis(
+    nodes: ArrayLike, translation: ArrayLike, omega: float, p: ArrayLike, q: ArrayLike
+) -> NDArray[np.float64]:
+    """Velocities of nodes that move together and turn about the axis from P to Q.
+
+    Parameters
+    ----------
+    nodes : (n, 3)
+        [m].
+    translation : (3,)
+        Velocity of the axis [m/s].
+    omega : float
+        Angular velocity, right-handed about P to Q [rad/s].
+    p, q : (3,)
+        Two points of the axis [m].
+
+    Raises
+    ------
+    InputError
+        When P and Q coincide and there is no axis.
+    """
+    p, q = np.asarray(p, float), np.asarray(q, float)
+    length = np.linalg.norm(q - p)
+    if not length > 1e-9:
+        raise InputError(
+            WHERE,
+            f"P and Q are one point {tuple(p.tolist())}",
+            column="initial_velocity",
+            expected="two points that span the axis",
+            mend="move Q along the angular velocity",
+        )
+    return np.asarray(translation, float) + np.cross(omega * (q - p) / length, np.asarray(nodes, float) - p)
+
+
+def _array(value: Any, name: str, shape: Sequence[int | None]) -> NDArray[np.float64]:
+    array = np.array(value, dtype=float, order="C")
+    _check_shape(array, name, shape)
+    if not np.isfinite(array).all():
+        row = np.argwhere(~np.isfinite(array))[0]
+        raise InputError(WHERE, f"row {row[0]} holds {array[tuple(row)]}", column=name, expected="finite numbers")
+    return array
+
+
+def _integers(value: Any, name: str, shape: Sequence[int | None]) -> NDArray[np.int64]:
+    array = np.array(value)
+    _check_shape(array, name, shape)
+    if not np.issubdtype(array.dtype, np.integer):
+        raise InputError(WHERE, f"its numbers are {array.dtype}", column=name, expected="whole numbers")
+    return array.astype(np.int64)
+
+
+def _check_shape(array: NDArray[Any], name: str, shape: Sequence[int | None]) -> None:
+    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape)):
+        wanted = ", ".join("any" if k is None else str(k) for k in shape)
+        raise InputError(WHERE, f"its shape is {array.shape}", column=name, expected=f"({wanted})")
