@@ -353,6 +353,12 @@ class Play(Setting):
         """Folder of the play, where the files it names lie."""
         return self._folder
 
+    def lying_in(self, folder: Path) -> Play:
+        """This play with the files it names in another folder."""
+        play = self.model_copy()
+        play._folder = Path(folder)
+        return play
+
     def file(self, name: str) -> Path:
         """Path of a file that the play names."""
         return self._folder / name

@@ -134,8 +134,8 @@ def build_driver(kinematics: Kinematics, t0_s: float, window: Window, *, step_s:
 
     near = (time >= start - 1e-12) & (time <= end + 1e-12)
     if near.sum() < 4:
-        near = np.argsort(np.abs(time - 0.5 * (start + end)), kind="stable")[:4]
-        near = np.isin(np.arange(len(time)), near)
+        closest = np.argsort(np.abs(time - 0.5 * (start + end)), kind="stable")[:4]
+        near = np.isin(np.arange(len(time)), closest)
     at = time[near]
     # x = x0 + v0 (t - start) + double integral from start
     double = twice(at) - twice(start) - once(start) * (at - start)[:, None]
@@ -183,10 +183,11 @@ def build_driver(kinematics: Kinematics, t0_s: float, window: Window, *, step_s:
 
 def _refuse_outside(time: np.ndarray, start: float, end: float) -> None:
     if start < time[0] - 1e-9 or end > time[-1] + 1e-9:
+        asked, there = f"{start * 1e3:.1f} to {end * 1e3:.1f} ms", f"{time[0] * 1e3:.1f} to {time[-1] * 1e3:.1f} ms"
+        file = "play.yaml"
         raise InputError(
-            "play.yaml",
-            f"the window {start * 1e3:.1f} to {end * 1e3:.1f} ms runs past the data, "
-            f"{time[0] * 1e3:.1f} to {time[-1] * 1e3:.1f} ms",
+            file,
+            f"the window {asked} runs past the data, {there}",
             column="window",
             expected="a window inside the clip or record",
             mend="shorten window.before_t0_s or window.duration_s, or add frames around the impact",

@@ -1,13 +1,14 @@
 """The peak that noise alone would show: the same clip without the impact.
 
-The head keeps the orientation it had before the impact and flies straight; the same landmarks are clicked
-in the same frames with the same noise, and the same method is applied. What it reports is the floor under
+The head stands still as it was before the impact (uniform motion would change nothing: it has no
+acceleration); the same landmarks are clicked in the same frames with the same noise, and the same method is
+applied. What it reports is the floor under
 every peak of the play.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from replay.motion.protocol import ProtocolMotion, along_ray, lens_of, reconstru
 from replay.motion.settings import CameraSettings
 from replay.motion.tracks import Template, Tracks
 
-REPLICATES = 24
+REPLICATES = 16
 _SEED = 196202
 
 
@@ -37,6 +38,7 @@ class NullPeaks:
     alpha_noise_rad_per_s2: float
     a_across_noise_m_per_s2: float
     a_along_noise_m_per_s2: float
+    _: KW_ONLY
     click_sigma_px: float
     replicates: int
 
@@ -82,10 +84,7 @@ def null_peaks(
         before = np.zeros_like(used)
         before[np.flatnonzero(used)[:3]] = True
     pre = before[used]
-    time = tracks.frames[used].astype(float)
-    slope = np.stack([np.polyfit(time[pre], motion.poses.shift[pre, i], 1) for i in range(3)], axis=1)
-    # a short segment must not throw the head out of the picture: beyond it the path is held within what was seen
-    shift = np.clip(slope[1] + time[:, None] * slope[0], motion.poses.shift.min(axis=0), motion.poses.shift.max(axis=0))
+    shift = np.repeat(np.median(motion.poses.shift[pre], axis=0)[None], used.sum(), axis=0)
     rotation = np.repeat(motion.poses.rotation[np.flatnonzero(pre)[-1:]], used.sum(), axis=0)
     exact, _ = project(template.points_m, rotation, shift, motion.poses.log_f, lens_of(camera))
     seen = tracks.seen[used]
@@ -105,4 +104,4 @@ def null_peaks(
         noise.append([np.sqrt(np.mean(curve[inner] ** 2)) for curve in (curves[0], curves[1], curves[3], curves[4])])
     middle = np.median(np.array(peaks), axis=0)
     spread = np.sqrt(np.mean(np.array(noise) ** 2, axis=0))
-    return NullPeaks(*(float(v) for v in middle), *(float(v) for v in spread), sigma, replicates)
+    return NullPeaks(*map(float, middle), *map(float, spread), click_sigma_px=sigma, replicates=replicates)

@@ -72,7 +72,7 @@ class Impact:
     background_rad_per_s: float = 1.0
     direction: tuple[float, float, float] = (0.94, 0.16, 0.30)
     velocity_m_per_s: tuple[float, float, float] = (-1.6, 0.1, 0.0)
-    position_m: tuple[float, float, float] = (0.0, 2.0, 0.0)
+    position_m: tuple[float, float, float] = (0.0, 1.6, 0.0)
     heading_deg: float = -118.0
     nod_deg: float = 8.0
 
@@ -189,7 +189,7 @@ def synthesise(preset: Preset, seed: int | None = None, impact: Impact | None = 
     Parameters
     ----------
     preset
-        ``demo``: eight landmarks, 239.76 fps, 2 m, 1200 px/m. ``broadcast``: the same impact, three
+        ``demo``: eight landmarks, 239.76 fps, 3840 x 2160 px, 1.6 m, 2400 px/m. ``broadcast``: the same impact, three
         landmarks, 59.94 fps, 45 m, under the article's own Config. ``wearable``: a mouthguard at 1 kHz.
     seed
         Seed of the noise; default that of the shipped play.
@@ -207,7 +207,7 @@ def synthesise(preset: Preset, seed: int | None = None, impact: Impact | None = 
     if preset == "wearable":
         return SyntheticPlay(impact, {"wearable.csv": _mouthguard(impact, rng), "truth.csv": _truth(impact)})
     if preset == "demo":
-        camera = SyntheticCamera(239.76, -24, 26, (1920, 1080), 2400.0)
+        camera = SyntheticCamera(239.76, -24, 26, (3840, 2160), 3840.0)
         config = _demo_config(camera, impact)
     else:
         far = (impact.position_m[0], 45.0, impact.position_m[2])
@@ -249,7 +249,7 @@ def _demo_config(camera: SyntheticCamera, impact: Impact) -> str:
             "cutoffs": {"linear": 40.0, "angular": 40.0, "focal": 5.0},
             "helmet_to_com": list(HEAD_SIZED_OFFSET_M),
             "camera_distance_m": round(impact.position_m[1], 3),
-            "camera_distance_sigma_m": 0.02,
+            "camera_distance_sigma_m": 0.016,
             "lens": "fixed",
             "click_sigma_px": camera.click_sigma_px,
         }
