@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from replay.report.head_view import _spread, section, strain_picture, surface
-from replay.report.markup import label, number, scientific, unit
+from replay.report.markup import fixed, label, limit, number, scientific, unit
 from replay.report.model import MeshView, Snapshots
 
 
@@ -107,3 +107,12 @@ def test_powers_of_ten_units_and_labels():
     assert label("reprojection_rmse_median_px", "px") == "reprojection rmse median"
     assert label("frames_above_8_px", "frames") == "frames above 8 px"
     assert label("hourglass_share: energy_pad", "1") == "hourglass share: energy pad"
+
+
+def test_limits_and_differences_are_printed_as_in_a_book():
+    assert limit(">= 1e-07") == "≥ 10⁻⁷"
+    assert limit("<= 2.5e-10 (fails unless <= 0.1)") == "≤ 2.5 × 10⁻¹⁰ (fails unless ≤ 0.1)"
+    assert limit("-10 to 10") == "−10 to 10"
+    assert fixed(8.7e-16) == "+0.00"
+    assert fixed(-7.25, 1) == "−7.2"
+    assert fixed(None) == "–"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from replay.report.markup import absent, number, scientific, table, text, unit
+from replay.report.markup import absent, fixed, number, scientific, table, text, unit
 from replay.report.model import Row
 
 _QUANTITY_WORDS = {
@@ -118,8 +118,8 @@ def peaks_table(fidelity: Mapping[str, Any] | None) -> str:
                 f"{words} ({unit(row['unit'])})",
                 f"{number(row['target_peak'])} at {number(1e3 * row['target_peak_time_s'], 3)}",
                 f"{number(row['applied_peak'])} at {number(1e3 * row['applied_peak_time_s'], 3)}",
-                number(row["delta_peak_percent"], 3),
-                number(row["delta_time_to_peak_ms"], 3),
+                fixed(row["delta_peak_percent"]),
+                fixed(row["delta_time_to_peak_ms"]),
                 number(row["rmse"], 3),
                 number(row["rmse_percent_of_peak"], 3),
             ]

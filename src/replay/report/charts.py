@@ -28,6 +28,7 @@ from replay.report.figure import (
     legend_below,
     new_figure,
 )
+from replay.report.markup import fixed
 
 TIME_LABEL = "time (ms)"
 _MOST_REGIONS = 8
@@ -80,8 +81,8 @@ def driver_charts(driver: pd.DataFrame, applied: pd.DataFrame, fidelity: Mapping
             if fidelity and fidelity.get(key):
                 row = fidelity[key]
                 caption += (
-                    f" Peaks differ by {_signed(row['delta_peak_percent'], '%')}, their times by"
-                    f" {_signed(row['delta_time_to_peak_ms'], 'ms')}; RMSE {row['rmse']:.3g} {unit}."
+                    f" Peaks differ by {fixed(row['delta_peak_percent'])} %, their times by"
+                    f" {fixed(row['delta_time_to_peak_ms'])} ms."
                 )
             alt = (
                 f"{title}: target peak {target.max():.4g} {unit} at {t_target[int(np.argmax(target))]:.3g} ms, "
@@ -89,10 +90,6 @@ def driver_charts(driver: pd.DataFrame, applied: pd.DataFrame, fidelity: Mapping
             )
             pictures.append(finish(figure, f"driver_{key}", alt, caption))
     return pictures
-
-
-def _signed(value: float | None, unit: str) -> str:
-    return "nothing defined" if value is None else f"{value:+.2g} {unit}".replace("-", "−")
 
 
 def kinematics_charts(

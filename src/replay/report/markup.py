@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
@@ -61,6 +62,22 @@ def scientific(value: float, digits: int = 3) -> str:
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
     return f"{mantissa} × 10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+
+
+def limit(words: str) -> str:
+    """Return a limit as it is printed: signs and powers of ten as in a book."""
+
+    def power(match: re.Match[str]) -> str:
+        mantissa = "" if match[1] == "1" else f"{match[1]} × "
+        return f"{mantissa}10{str(int(match[2])).translate(_SUPERSCRIPT)}"
+
+    words = re.sub(r"\b([\d.]+)e([+-]?\d+)", power, words)
+    return text(words.replace("<=", "≤").replace(">=", "≥").replace("-", "−"))
+
+
+def fixed(value: Any, decimals: int = 2) -> str:
+    """Return a difference with its sign and so many decimals, or a dash."""
+    return "–" if value is None else f"{value + 0.0:+.{decimals}f}".replace("-", "−")
 
 
 def unit(name: Any) -> str:

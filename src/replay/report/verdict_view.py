@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from replay.report.markup import badge, label, number, table, text, unit
+from replay.report.markup import badge, label, limit, number, table, text, unit
 from replay.report.model import ReportInput, Row
 
 _STATUS_KIND = {"accepted": "pass", "accepted with warnings": "warn", "rejected": "fail"}
@@ -39,7 +39,7 @@ def banner(report: ReportInput) -> str:
 def _loosened(report: ReportInput, item: Row) -> str:
     check = _find(report, item["gate"], item["check"])
     of = check["unit"] if check else ""
-    limits = [_with_unit(_limit_words(item[key]), of) for key in ("limit", "instead_of")]
+    limits = [_with_unit(limit(item[key]), of) for key in ("limit", "instead_of")]
     return (
         f'<p class="loosened">Loosened by the play: {gate_title(report, item["gate"])}, '
         f"{label(item['check'], of)} {limits[0]} instead of {limits[1]}</p>"
@@ -53,7 +53,7 @@ def _cause(report: ReportInput, cause: Row) -> str:
         return text(cause["sentence"])
     words = label(check["name"], check["unit"])
     if check["value"] is not None:
-        words += f" {_with_unit(number(check['value']), check['unit'])}, limit {_limit_words(check['limit'])}"
+        words += f" {_with_unit(number(check['value']), check['unit'])}, limit {limit(check['limit'])}"
     return words + (f" ({text(check['detail'])})" if check.get("detail") else "")
 
 
@@ -64,10 +64,6 @@ def _find(report: ReportInput, gate_name: str, check_name: str) -> Row | None:
 
 def _with_unit(value: str, of: str) -> str:
     return f"{value} {unit(of)}".rstrip()
-
-
-def _limit_words(limit: str) -> str:
-    return text(limit.replace("<=", "≤").replace(">=", "≥").replace("-", "−"))
 
 
 def gate_title(report: ReportInput, name: str) -> str:
@@ -106,9 +102,9 @@ def _checks(report: ReportInput, gate: Row) -> str:
     rows = []
     for check in gate["checks"]:
         loose = check.get("loosened_from")
-        limit = f'<span class="limit">{_limit_words(check["limit"])}</span> {unit(check["unit"])}'
+        allowed = f'<span class="limit">{limit(check["limit"])}</span> {unit(check["unit"])}'
         if loose:
-            limit += f'<br><span class="loose">loosened from {_limit_words(loose)}</span>'
+            allowed += f'<br><span class="loose">loosened from {limit(loose)}</span>'
         printed = _with_unit(number(check["value"]), check["unit"] if check["value"] is not None else "")
         detail = f'<br><span class="detail">{text(check["detail"])}</span>' if check.get("detail") else ""
         rows.append(
@@ -116,7 +112,7 @@ def _checks(report: ReportInput, gate: Row) -> str:
                 label(check["name"], check["unit"]) + detail,
                 badge(check["verdict"]),
                 printed,
-                limit,
+                allowed,
                 f'<span class="source">{text(check["source"])}</span>',
             ]
         )
