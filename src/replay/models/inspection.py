@@ -1,0 +1,213 @@
+"""What a technician would look up in the model before trusting it: the numbers of the helmet and assembly gates."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from replay.models.build import PID_BLOCKS
+from replay.models.mass import Datum, MassProperties, mass_properties, three_point_datum
+from replay.models.model import Model
+from replay.models.quality import hex_volumes, scaled_jacobians
+
+PAD_SETS = ("H1_pads_set1", "H1_pads_set2")
+FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), (60009020, "chin_cup", 2))
+"""Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
+
+
+def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
+    """Mass properties of an assembly, of one part by name, or of everything.
+
+    Parameters
+    ----------
+    model
+        The model.
+    assembly
+        ``head`` or ``helmet``.
+    name
+        Name of one part.
+    """
+    chosen = model.elements_of(assembly=assembly)
+    if name is not None:
+        chosen &= model.element_part == model.part_index(name)
+    return mass_properties(model.nodes, model.hexes[chosen], model.element_densities()[chosen])
+
+
+def helmet_datum(model: Model) -> Datum:
+    """Three-point datum: the middle of the shell's front edge, and its outermost points left and right.
+
+    A helmet maker finds the same points on the real shell: centre of the brow edge, and the widest point of each
+    side at the height of the brow edge.
+    """
+    shell = model.nodes[np.unique(model.hexes[model.elements_of(role="shell")])]
+    middle = shell[np.abs(shell[:, 1]) < 1e-9]
+    front = middle[middle[:, 0] > 0]
+    brow = front[np.argmin(np.round(front[:, 2], 9))]
+    near = shell[np.abs(shell[:, 2] - brow[2]) < 0.02]
+    left, right = near[np.argmax(np.round(near[:, 1], 9))], near[np.argmin(np.round(near[:, 1], 9))]
+    return three_point_datum(brow, left, right)
+
+
+def mass_report(model: Model) -> dict[str, Any]:
+    """Mass, centre of gravity and inertia of head, helmet and parts; the helmet's CG in its datum (step 1.3)."""
+    report: dict[str, Any] = {"units": "kg, m, kg m^2; head frame", "assemblies": {}, "parts": {}}
+    for assembly in ("head", "helmet"):
+        if model.elements_of(assembly=assembly).any():
+            report["assemblies"][assembly] = _as_dict(assembly_mass(model, assembly))
+    for part in model.parts:
+        report["parts"][part.name] = {"pid": part.pid, **_as_dict(assembly_mass(model, name=part.name))}
+    if model.elements_of(role="shell").any():
+        datum = helmet_datum(model)
+        cg = assembly_mass(model, "helmet").cg_m
+        report["datum"] = {
+            "what": "centre of the circle through brow centre and the shell's sides at its height",
+            "origin_m": datum.origin_m.tolist(),
+            "axes": datum.axes.tolist(),
+            "radius_m": datum.radius_m,
+            "helmet_cg_m": datum.relative(cg).tolist(),
+        }
+    report["calibration"] = model.info.get("calibration", {})
+    return report
+
+
+def helmet_inspection(model: Model, *, helmet_cg_in_datum_m: np.ndarray | None = None) -> dict[str, Any]:
+    """Numbers for the helmet gate, by the gate's names, and what stands behind them.
+
+    Parameters
+    ----------
+    model
+        The model.
+    helmet_cg_in_datum_m
+        Measured centre of gravity of the physical helmet in the three-point datum, (3,) [m]; without one that
+        check has no power and says so.
+    """
+    chosen = model.elements_of(assembly="helmet")
+    hexes = model.hexes[chosen]
+    points = model.nodes[np.unique(hexes)]
+    length, width, height = (float(v) for v in points.max(axis=0) - points.min(axis=0))
+    wedges = model.element_ids[chosen][_degenerate(hexes)]
+    missing = missing_interfaces(model)
+    properties = assembly_mass(model, "helmet")
+    return {
+        "mass_kg": properties.mass_kg,
+        "cg_m": properties.cg_m.tolist(),
+        "cg_in_datum_m": helmet_datum(model).relative(properties.cg_m).tolist(),
+        "cg_offset_m": _cg_offset(model, helmet_cg_in_datum_m),
+        "length_m": length,
+        "width_m": width,
+        "height_m": height,
+        "elements": len(hexes),
+        "hex_share": 1.0 - len(wedges) / len(hexes),
+        "wedge_share": len(wedges) / len(hexes),
+        "wedge_ids": [int(v) for v in wedges],
+        "removed_not_wedge": 0,
+        "missing_interfaces": len(missing),
+        "missing_interfaces_detail": ", ".join(missing),
+        "min_volume_m3": float(hex_volumes(model.nodes, hexes).min()),
+        "min_scaled_jacobian": float(scaled_jacobians(model.nodes, hexes).min()),
+    }
+
+
+def missing_interfaces(model: Model) -> list[str]:
+    """Name every interface of the article's step 1.5 that the model lacks: pads, pad-pad, mounts, strap anchors."""
+    missing = [name for name in PAD_SETS if not model.part_sets.get(name)]
+    names = {part.name: k for k, part in enumerate(model.parts)}
+    for name, k in names.items():
+        if name.startswith("comfort_pad_"):
+            partner = names.get(name.replace("comfort", "energy"))
+            if partner is None or not len(_shared(model, k, partner)):
+                missing.append(f"pad-pad {name}")
+        elif name.startswith("energy_pad_") and ("shell" not in names or not len(_shared(model, k, names["shell"]))):
+            missing.append(f"pad-shell {name}")
+    for place in ("brow", "side_high", "side_low"):
+        missing += [
+            f"facemask mount {place} {side}"
+            for side in ("left", "right")
+            if not len(model.node_sets.get(f"facemask_mount_{place}_{side}", ()))
+        ]
+    for anchor in ("strap_anchor_front", "strap_anchor_rear", "chin_cup_strap"):
+        missing += [
+            f"{anchor} {side}" for side in ("left", "right") if not len(model.node_sets.get(f"{anchor}_{side}", ()))
+        ]
+    if "chin_cup" not in names:
+        missing.append("chin cup")
+    return missing
+
+
+def assembly_inspection(
+    model: Model, *, helmet_mass_kg: float | None = None, helmet_cg_in_datum_m: np.ndarray | None = None
+) -> dict[str, Any]:
+    """Numbers for the assembly gate, by the gate's names, and what stands behind them.
+
+    Parameters
+    ----------
+    model
+        The model.
+    helmet_mass_kg
+        Mass of the physical helmet [kg]; without one that check has no power and says so.
+    helmet_cg_in_datum_m
+        Its measured centre of gravity in the three-point datum, (3,) [m].
+    """
+    head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
+    pids = [part.pid for part in model.parts]
+    outside = [
+        part.name for part in model.parts if not PID_BLOCKS[part.assembly][0] < part.pid <= PID_BLOCKS[part.assembly][1]
+    ]
+    loose = unconnected_parts(model)
+    unresolved = [
+        f"{pid}-{other}"
+        for pid, other, _ in FRICTION_PAIRS
+        if pid not in pids or not (model.part_sets.get(other) or other in {part.name for part in model.parts})
+    ]
+    mass: float | str = "no mass of the physical helmet is given"
+    if helmet_mass_kg is not None:
+        mass = abs(helmet.mass_kg - helmet_mass_kg)
+    return {
+        "helmet_mass_kg": helmet.mass_kg,
+        "helmet_mass_difference_kg": mass,
+        "helmet_cg_difference_m": _cg_offset(model, helmet_cg_in_datum_m),
+        "head_mass_kg": head.mass_kg,
+        "head_cg_offset_m": float(np.sqrt(np.sum(head.cg_m**2))),
+        "duplicate_part_ids": len(pids) - len(set(pids)),
+        "parts_outside_block": len(outside),
+        "parts_outside_block_detail": ", ".join(outside),
+        "unconnected_parts": len(loose),
+        "unconnected_parts_detail": ", ".join(loose),
+        "unresolved_friction_pairs": len(unresolved),
+        "unresolved_friction_pairs_detail": ", ".join(unresolved),
+        "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
+    }
+
+
+def unconnected_parts(model: Model) -> list[str]:
+    """Names of the parts that share no node with another part."""
+    pairs = np.unique(np.stack([np.repeat(model.element_part, 8), model.hexes.ravel()], axis=1), axis=0)
+    users = np.bincount(pairs[:, 1], minlength=len(model.nodes))
+    tied = np.unique(pairs[users[pairs[:, 1]] > 1, 0])
+    return [part.name for k, part in enumerate(model.parts) if k not in tied]
+
+
+def _cg_offset(model: Model, measured_in_datum_m: np.ndarray | None) -> float | str:
+    if measured_in_datum_m is None:
+        return "no centre of gravity of the physical helmet is given"
+    away = helmet_datum(model).relative(assembly_mass(model, "helmet").cg_m) - np.asarray(measured_in_datum_m)
+    return float(np.sqrt(np.sum(away**2)))
+
+
+def _shared(model: Model, first: int, second: int) -> np.ndarray:
+    return np.intersect1d(model.hexes[model.element_part == first], model.hexes[model.element_part == second])
+
+
+def _degenerate(hexes: np.ndarray) -> np.ndarray:
+    ordered = np.sort(hexes, axis=1)
+    return (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+
+
+def _as_dict(properties: MassProperties) -> dict[str, Any]:
+    return {
+        "mass_kg": properties.mass_kg,
+        "cg_m": properties.cg_m.tolist(),
+        "inertia_kg_m2": properties.inertia_kg_m2.tolist(),
+        "principal_kg_m2": properties.principal_kg_m2.tolist(),
+    }
