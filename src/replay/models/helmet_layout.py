@@ -45,7 +45,7 @@ def helmet_layout(lattice: CubeLattice, helmet: dict[str, Any]) -> HelmetLayout:
     shell = _covered(lattice.quad_centres, helmet["coverage"])
     directions = _bent(lattice, shell, helmet)
     pad = np.where(shell, _pad_zones(lattice, helmet), -1)
-    return HelmetLayout(shell, pad, _chin(lattice, directions, helmet["chin"]) & ~shell, directions)
+    return HelmetLayout(shell, pad, _chin(lattice, helmet["chin"]), directions)
 
 
 def angles_of(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,14 +97,10 @@ def _pad_zones(lattice: CubeLattice, helmet: dict[str, Any]) -> np.ndarray:
     return pad
 
 
-def _chin(lattice: CubeLattice, directions: np.ndarray, chin: dict[str, float]) -> np.ndarray:
-    azimuth, elevation = angles_of(_unit(directions[lattice.quads].mean(axis=1)))
-    width = np.abs(azimuth) * np.cos(np.radians(elevation)) / chin["half_width_deg"] * 1.4
-    height = np.abs(elevation - chin["centre_elevation_deg"]) / chin["half_height_deg"]
-    near = (width < 1) & (height < 1) & (np.abs(azimuth) < 90)
-    if not near.any():
-        near = (width + height) == (width + height).min()
-    return near
+def _chin(lattice: CubeLattice, chin: dict[str, float]) -> np.ndarray:
+    x, y, z = lattice.quad_centres.T
+    front, bottom = (x == 1) & (z < chin["front_below"]), (z == -1) & (x > chin["bottom_before"])
+    return (front | bottom) & (np.abs(y) < chin["half_width"])
 
 
 def _bent(lattice: CubeLattice, shell: np.ndarray, helmet: dict[str, Any]) -> np.ndarray:

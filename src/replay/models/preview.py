@@ -30,7 +30,7 @@ _COLOURS = {
 _LIGHT = np.array([-0.35, 0.45, 0.82])
 
 
-def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 110) -> None:
+def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -> None:
     """Draw the model as PNG; the same model gives the same bytes.
 
     Parameters
