@@ -363,12 +363,6 @@ class Play(Setting):
         """Path of a file that the play names."""
         return self._folder / name
 
-    def lying_in(self, folder: Path) -> Play:
-        """Return the same play with the files it names in another folder (the checked copies of a run)."""
-        moved = self.model_copy()
-        moved._folder = Path(folder)
-        return moved
-
     @property
     def files(self) -> tuple[Path, ...]:
         """Every raw file the play names, in a fixed order."""

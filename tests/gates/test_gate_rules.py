@@ -44,8 +44,8 @@ def test_three_landmarks_have_no_residual_and_do_not_pass(limits):
     assert checks["reprojection_rmse_median_px"].verdict == "vacuous"
     assert checks["frames_above_8_px"].verdict == "vacuous"
     assert "no degrees of freedom" in checks["reprojection_rmse_median_px"].detail
-    assert checks["degrees_of_freedom_min"].verdict == "warn"
-    assert gate.verdict == "warn"
+    assert checks["degrees_of_freedom_min"].verdict == "fail"
+    assert gate.verdict == "fail"
 
 
 def test_unobservable_focal_length_hands_the_gate_to_the_scale(limits):
@@ -58,7 +58,7 @@ def test_unobservable_focal_length_hands_the_gate_to_the_scale(limits):
     assert failing.verdict == "fail"
 
 
-def test_articles_own_footage_passes_its_table_and_is_warned_about_its_cutoff(limits):
+def test_articles_own_footage_is_refused_for_want_of_freedom_and_warned_about_its_cutoff(limits):
     quality = flawless.GOOD["video"] | {
         "degrees_of_freedom_min": 0,
         "angular_cutoff_over_nyquist": 40 / (59.94 / 2),
@@ -67,7 +67,7 @@ def test_articles_own_footage_passes_its_table_and_is_warned_about_its_cutoff(li
     gate = video_reconstruction_gate(quality, limits)
     named = {check.name for check in gate.causes()}
     assert {"angular_cutoff_over_nyquist", "helmet_to_com_m", "degrees_of_freedom_min"} <= named
-    assert gate.verdict == "warn"
+    assert gate.verdict == "fail"
 
 
 def test_model_without_contact_says_so_and_does_not_pass(limits):

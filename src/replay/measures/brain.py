@@ -80,9 +80,17 @@ PEAK_TABLE = TableFormat(
 class BrainView(Protocol):
     """What the recorder needs to see of a state of the solver, all elements in the solver's input order."""
 
-    time_s: float
-    stress: NDArray[np.float64]
-    volumes: NDArray[np.float64]
+    @property
+    def time_s(self) -> float:
+        """Time of the state [s]."""
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """Cauchy stress (m, 6), xx, yy, zz, xy, yz, zx [Pa]."""
+
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volumes (m,) [m^3]."""
 
     def deformation_gradient(self) -> NDArray[np.float64]:
         """Return F of every element, (m, 3, 3)."""

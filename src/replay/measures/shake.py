@@ -41,11 +41,25 @@ SHAKE_TABLE = TableFormat(
 class ShakeView(Protocol):
     """What the recorder needs to see of a state of the solver, in the solver's input order."""
 
-    time_s: float
-    coordinates: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    stress: NDArray[np.float64]
-    volumes: NDArray[np.float64]
+    @property
+    def time_s(self) -> float:
+        """Time of the state [s]."""
+
+    @property
+    def coordinates(self) -> NDArray[np.float64]:
+        """Coordinates (n, 3) [m]."""
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """Velocities (n, 3) [m/s]."""
+
+    @property
+    def stress(self) -> NDArray[np.float64]:
+        """Cauchy stress (m, 6), xx, yy, zz, xy, yz, zx [Pa]."""
+
+    @property
+    def volumes(self) -> NDArray[np.float64]:
+        """Volumes (m,) [m^3]."""
 
 
 class ShakeRecorder:

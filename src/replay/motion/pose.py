@@ -235,7 +235,9 @@ def mirrored(points: np.ndarray, seen: np.ndarray, poses: Poses) -> Poses:
         visible = points[seen[k]]
         centre = visible.mean(axis=0)
         thin = np.linalg.svd(visible - centre)[2][2]
-        turned = np.diag([1.0, 1.0, -1.0]) @ poses.rotation[k] @ (np.eye(3) - 2.0 * np.outer(thin, thin))
+        ray = poses.rotation[k] @ centre + position[k]
+        ray /= np.linalg.norm(ray)
+        turned = (np.eye(3) - 2.0 * np.outer(ray, ray)) @ poses.rotation[k] @ (np.eye(3) - 2.0 * np.outer(thin, thin))
         position[k] += (poses.rotation[k] - turned) @ centre
         rotation[k] = turned
     position[:, 2] = np.maximum(position[:, 2], 1e-2)

@@ -329,14 +329,14 @@ _PEAK_LINES = (
 def summary(result: Reconstruction) -> str:
     """One page a person reads: what was found, beside what noise alone would show."""
     play, quality = result.play, result.quality
+    samples = "frames" if quality.kind == "clicks" else "samples"
+    angular, linear = result.t0_angular_s * 1e3, result.t0_linear_s * 1e3
     lines = [
         f"Reconstruction of play {play.name}",
         f"{play.title}" if play.title else "",
         "",
-        f"source      {quality.kind}, {quality.samples} {'frames' if quality.kind == 'clicks' else 'samples'} "
-        f"at {quality.rate_hz:.6g} Hz",
-        f"t0          {result.t0_s * 1e3:.2f} ms ({play.t0}); angular {result.t0_angular_s * 1e3:.2f} ms, "
-        f"linear {result.t0_linear_s * 1e3:.2f} ms",
+        f"source      {quality.kind}, {quality.samples} {samples} at {quality.rate_hz:.6g} Hz",
+        f"t0          {result.t0_s * 1e3:.2f} ms ({play.t0}); angular {angular:.2f} ms, linear {linear:.2f} ms",
         "",
         "Peaks                              value      noise alone   ratio    at [ms]",
     ]

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from replay.models import Model
+from replay.models import Model, select_assembly
 from replay.play import Play
 from replay.solver import Controls, Material, PrescribedMotion, Problem, SolverPart
 
@@ -60,7 +60,7 @@ def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Pr
     velocity = driver[["vx_m_per_s", "vy_m_per_s", "vz_m_per_s"]].to_numpy()
     omega = driver[[f"omega_{axis}_rad_per_s" for axis in "xyz"]].to_numpy()
     arms = Rotation.from_quat(quaternion[0]).apply(model.nodes)
-    parts = _parts(model, range(len(model.parts)))
+    parts = _parts(model)
     return Problem(
         nodes=position[0] + arms,
         hexes=model.hexes,
@@ -81,38 +81,34 @@ def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Pr
     )
 
 
-def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> tuple[Problem, np.ndarray]:
-    """The helmet alone in free flight along x (protocol 1.6).
+def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Problem:
+    """The helmet alone in free flight along x (protocol 1.6); nodes it shared with the head are free.
 
-    Returns
-    -------
-    problem : Problem
-        Parts of the helmet only; nodes it shared with the head are free.
-    rows : (k,) int
-        Its elements, as rows of the model's.
+    Parameters
+    ----------
+    model
+        Head and helmet.
+    speed_m_per_s
+        Initial speed of the whole helmet.
+    controls
+        Those of the replay, for a shorter time.
     """
-    rows = np.flatnonzero(model.elements_of(assembly="helmet"))
-    nodes, hexes = np.unique(model.hexes[rows], return_inverse=True)
-    kept, element_part = np.unique(model.element_part[rows], return_inverse=True)
-    velocity = np.zeros((len(nodes), 3))
-    velocity[:, 0] = speed_m_per_s
-    problem = Problem(
-        nodes=model.nodes[nodes],
-        hexes=hexes.reshape(-1, 8),
-        element_part=element_part,
-        parts=_parts(model, kept),
+    helmet = select_assembly(model, "helmet")
+    return Problem(
+        nodes=helmet.nodes,
+        hexes=helmet.hexes,
+        element_part=helmet.element_part,
+        parts=_parts(helmet),
         controls=controls,
-        initial_velocity=velocity,
-        node_ids=model.node_ids[nodes],
-        element_ids=model.element_ids[rows],
+        initial_velocity=np.tile([speed_m_per_s, 0.0, 0.0], (len(helmet.nodes), 1)),
+        node_ids=helmet.node_ids,
+        element_ids=helmet.element_ids,
     )
-    return problem, rows
 
 
-def _parts(model: Model, chosen: range | np.ndarray) -> tuple[SolverPart, ...]:
+def _parts(model: Model) -> tuple[SolverPart, ...]:
     parts = []
-    for index in chosen:
-        part = model.parts[int(index)]
+    for part in model.parts:
         facts = model.materials[part.material]
         material = Material(part.material, facts["law"], facts["density_kg_per_m3"], facts["parameters"])
         parts.append(SolverPart(part.pid, part.name, material))

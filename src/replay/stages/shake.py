@@ -23,7 +23,7 @@ def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s:
     play = read_settings(stage)
     model = read_model(stage.read("assembly", "model.h5"))
     controls = controls_of(play, play.shake.duration_s, checkpoint_every_s=checkpoint_every_s)
-    problem, _ = helmet_problem(model, play.shake.speed_m_per_s, controls)
+    problem = helmet_problem(model, play.shake.speed_m_per_s, controls)
     recorder = ShakeRecorder(
         problem.hexes,
         problem.nodes,

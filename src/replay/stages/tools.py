@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import cast
 
 from replay import bundle, models
 from replay.errors import InputError
 from replay.files import read_json, write_text
-from replay.gates import Limits, read_gate
-from replay.play import play_schema_text
+from replay.gates import Gate, Limits, read_gate
+from replay.motion import synthesise
+from replay.motion.synthetic import Preset
+from replay.play import load_play, play_schema_text
 from replay.stages.verdict import GATE_FILES
 
 _COLOURS = {"pass": "32", "warn": "33", "fail": "31", "not reached": "90"}
@@ -28,12 +31,12 @@ def show_verdict(results: Path) -> int:
         raise InputError(path, "there is no verdict here", mend=f"run `make run PLAY={results.name}` first")
     verdict = read_json(path)
     limits = Limits.load()
-    found = {}
+    found: dict[str, Gate] = {}
     for stage, files in {**GATE_FILES, "verdict": ("gate.json",)}.items():
         for file in files:
             if (results / stage / file).is_file():
-                gate = read_gate(results / stage / file, limits)
-                found[gate.name] = gate
+                judged = read_gate(results / stage / file, limits)
+                found[judged.name] = judged
     print(f"\n{results.name}: {verdict['status'].upper()}\n")
     for name, facts in limits.gates.items():
         gate = found.get(name)
@@ -45,9 +48,9 @@ def show_verdict(results: Path) -> int:
         print(f"  LOOSENED {entry['gate']}.{entry['check']}: {entry['limit']} instead of {entry['instead_of']}")
     page, archive = results / "report" / "report.html", results / "bundle" / f"{results.name}.zip"
     print()
-    for label, file in (("report", page), ("bundle", archive)):
-        if file.is_file():
-            print(f"  {label}: {file}")
+    for label, path in (("report", page), ("bundle", archive)):
+        if path.is_file():
+            print(f"  {label}: {path}")
     print("\n  These are process diagnostics: no statement on injury or on a player.")
     return 3 if verdict["status"] == "rejected" else 0
 
@@ -70,13 +73,17 @@ def compare_bundles(old: Path, new: Path) -> int:
 
 
 def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
-    """Write one of the synthetic plays into a new folder."""
-    from replay.motion import synthetic
-
-    if into.exists() and any(into.iterdir()):
+    """Write one of the synthetic plays, with its truth and its description, into a new folder."""
+    if into.exists() and (not into.is_dir() or any(into.iterdir())):
         raise InputError(into, "the folder is not empty", mend="name a new folder")
-    synthetic.write_play(kind, into, seed=seed)
-    print(f"{into}: {kind} play with its truth; run it with `make run PLAY={into.name} PLAYS={into.parent}`")
+    shipped = Path(__file__).resolve().parents[3] / "config" / "plays" / kind / "play.yaml"
+    if not shipped.is_file():
+        raise InputError(shipped, "the shipped play is not here", mend="run from a checkout of the project")
+    synthesise(cast(Preset, kind), seed).write(into)
+    text = shipped.read_text(encoding="utf-8").replace(f"\nname: {kind}\n", f"\nname: {into.name}\n")
+    write_text(into / "play.yaml", text)
+    load_play(into)
+    print(f"{into}: a play of kind {kind} with its truth\nrun it: make run PLAY={into.name} PLAYS={into.parent}")
     return 0
 
 

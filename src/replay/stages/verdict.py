@@ -23,8 +23,17 @@ _AFTER = ("settings", "reconstruction", "assembly", "decks", "shake", "replay", 
 
 
 def limits_of(stage: Stage) -> Limits:
-    """Limits in force for the play: the shipped ones, with the play's own where it sets some."""
-    return Limits.load(read_settings(stage).gates)
+    """Limits in force for the play: the shipped ones, with the play's own where it sets some.
+
+    The tolerances of the physical helmet are settings of the play of their own (``helmet.mass_tolerance_kg``).
+    """
+    play = read_settings(stage)
+    tolerances = {
+        "assembly.helmet_mass_difference_kg": play.helmet.mass_tolerance_kg,
+        "assembly.helmet_cg_difference_m": play.helmet.cg_tolerance_m,
+        "helmet.cg_offset_m": play.helmet.cg_tolerance_m,
+    }
+    return Limits.load({**tolerances, **play.gates})
 
 
 def collect(stage: Stage) -> list[Gate]:

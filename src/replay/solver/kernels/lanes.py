@@ -226,7 +226,8 @@ def law_forces(
     work : (n_blocks, 3) float64
         Work of the step in stress, hourglass forces and bulk viscosity, summed over the block [J] (output).
     """
-    for block in prange(connectivity.shape[0]):
+    for index in prange(connectivity.shape[0]):
+        block = np.int64(index)  # the loop's own index is unsigned; one type, one compilation
         run_block(
             block, fill[block], nodal, connectivity, mass, reference, stress, hourglass, state, parameters,
             part[block], control, dt, force, step, work,
