@@ -149,6 +149,15 @@ class Stage:
         full.parent.mkdir(parents=True, exist_ok=True)
         return full
 
+    def made(self, stage: str, path: str) -> bool:
+        """Whether an earlier stage made a file; a play that was stopped has fewer."""
+        return self._before[stage].artifact(path) is not None
+
+    def folder_for_many(self) -> Path:
+        """The stage's folder, cleared, for a writer that names its own files; list them with `write` afterwards."""
+        self._begin()
+        return self.folder
+
     def write_all(self, meanings: dict[str, str]) -> Path:
         """List several files of this stage at once; return its folder."""
         for path, meaning in meanings.items():

@@ -1,0 +1,283 @@
+"""Stage ``report``: everything the stages found, on one page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from replay import __version__
+from replay.files import read_json
+from replay.gates import Limits
+from replay.measures import Motion, read_snapshots
+from replay.models import Model, read_model
+from replay.play import Play
+from replay.report import MeshView, ReportInput, Snapshots, write_report
+from replay.stages.fidelity import skull_motion
+from replay.stages.frame import Stage, Workspace
+from replay.stages.settings import read_settings
+from replay.stages.verdict import GATE_FILES, limits_of
+
+_TITLES = {
+    "inputs": "Raw tracks",
+    "reconstruction": "Reconstruction",
+    "driver": "Driver",
+    "assembly": "Head and helmet",
+    "shake": "Helmet shake",
+    "decks": "Run decks",
+    "replay": "Replay",
+    "sensitivity": "Half the hourglass coefficient",
+    "fidelity": "Driver fidelity",
+    "measures": "Measures",
+}
+_WITHOUT_CONTACT = (
+    (
+        "Sliding, lift-off and bottoming out of the helmet. There is no contact in this model: pads share nodes with scalp"
+        " and shell, so the helmet stays joined to the head."
+    ),
+    (
+        "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet, and"
+        " facemask forces, contact work and the action of an impactor are not computed."
+    ),
+    "Damage. The brain is visco-elastic here; the article's damage variable is not computed.",
+)
+
+
+def run(workspace: Workspace) -> str | None:
+    """Write the page of a play, however far it came."""
+    stage = Stage(workspace, "report", after=["settings", *_TITLES, "verdict"])
+    page = write_report(stage.folder_for_many(), collect(stage))
+    stage.write("report.html", "the page: verdict, evidence, and what the run cannot show")
+    for picture in sorted((stage.folder / "figures").glob("*")):
+        stage.write(f"figures/{picture.name}", "a figure of the page")
+    print(f"{page}: {page.stat().st_size / 1e6:.1f} MB, opens without a network")
+    return stage.finish()
+
+
+def collect(stage: Stage) -> ReportInput:
+    """Gather what the page shows; what a rejected play never reached stays absent."""
+    play = read_settings(stage)
+    limits = limits_of(stage)
+    inputs = read_json(stage.read("inputs", "inputs.json"))
+    quality = read_json(stage.read("reconstruction", "quality.json"))
+    model = read_model(stage.read("assembly", "model.h5"))
+    known: dict[str, Any] = {
+        "play": _play_facts(play, quality, inputs),
+        "verdict": read_json(stage.read("verdict", "verdict.json")),
+        "gates": _gates(stage),
+        "gate_facts": {
+            name: {"title": facts.title, "source": facts.source, "stops_run": facts.stops_run}
+            for name, facts in limits.gates.items()
+        },
+        "stages": _stages(stage),
+        "t0_s": quality["t0_s"],
+        "kinematics": _table(stage, "reconstruction", "kinematics.csv"),
+        "quality": _table_two(stage, limits) if quality["kind"] == "clicks" else (),
+        "parts": _parts(stage, model),
+        "parameters": _parameters(model),
+        "mesh": _mesh(model),
+        "cannot_show": [*_WITHOUT_CONTACT, *quality["warnings"]],
+        "inputs": inputs["files"],
+        "provenance": _provenance(stage, model),
+        "mass_scaling_time_step_s": play.solver.mass_scaling_time_step_s,
+    }
+    if stage.made("driver", "driver_6dof.csv"):
+        start = read_json(stage.read("driver", "initial_velocity.json"))["time_s"]
+        known["driver"] = _table(stage, "driver", "driver_6dof.csv")
+        known["window_s"] = (start, start + play.window.duration_s)
+    if stage.made("fidelity", "fidelity.json"):
+        known |= _replayed(stage, play, model)
+    return ReportInput(**known)
+
+
+def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
+    """What only a replay that ran to its end has."""
+    measures = read_json(stage.read("measures", "measures.json"))
+    applied = skull_motion(stage)
+    fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
+    energy = _table(stage, "replay", "part_energy.csv")
+    return {
+        "applied": _columns(applied),
+        "fidelity": read_json(stage.read("fidelity", "fidelity.json")),
+        "initial_conditions": _initial_conditions(stage, applied),
+        "energy": _table(stage, "replay", "energy.csv"),
+        "timestep": _table(stage, "replay", "timestep.csv"),
+        "part_energy": energy.assign(fluid=energy["pid"].isin(fluid)),
+        "head_measures": measures["head"],
+        "brain_histories": _table(stage, "replay", "brain_histories.csv"),
+        "convergence_class": measures["brain_convergence_class"],
+        "action": _table(stage, "measures", "action.csv"),
+        "crossover_s": measures["action"]["crossover_time_s"],
+        "snapshots": _snapshots(stage, model),
+    }
+
+
+def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:
+    return pd.read_csv(stage.read(name, file))
+
+
+def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "name": play.name,
+        "title": play.title,
+        "struck player": play.struck_player,
+        "source": "clicked video" if play.source.kind == "clicks" else "wearable",
+        "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
+        "t0": f"{1e3 * quality['t0_s']:.1f} ms (peak {play.t0} acceleration)",
+        "window": f"{1e3 * play.window.duration_s:g} ms from {1e3 * play.window.before_t0_s:g} ms before t0",
+        "helmet": f"{play.helmet.model}, {play.helmet.mass_kg:g} kg",
+        "model": f"{play.model.preset}, {play.model.resolution}",
+    }
+
+
+def _gates(stage: Stage) -> list[Any]:
+    found = {}
+    for name, files in {**GATE_FILES, "verdict": ("gate.json",)}.items():
+        for file in files:
+            if stage.made(name, file):
+                gate = read_json(stage.read(name, file))
+                found[gate["gate"]] = gate
+    return [found[name] for name in Limits.load().gates if name in found]
+
+
+def _stages(stage: Stage) -> list[dict[str, str]]:
+    rows = []
+    for name, title in _TITLES.items():
+        manifest = stage.manifest_of(name)
+        verdicts = [
+            read_json(stage.read(name, file))["verdict"] for file in GATE_FILES.get(name, ()) if stage.made(name, file)
+        ]
+        state = next((v for v in ("fail", "warn", "pass") if v in verdicts), "done")
+        if not manifest.artifacts:
+            state = "not run"
+        rows.append({"title": title, "state": state, "detail": ""})
+    return rows
+
+
+def _table_two(stage: Stage, limits: Limits) -> list[dict[str, Any]]:
+    """The article's Table 2 from the frames of this run."""
+    frames = _table(stage, "reconstruction", "qc_per_frame.csv")
+    rows = []
+    for metric, unit, column, limit in (
+        ("Reprojection error", "px", "reprojection_rmse_px", "reconstruction.reprojection_rmse_median_px"),
+        ("Focal-length drift", "%", "focal_drift_percent", "reconstruction.focal_drift_median_percent"),
+        ("Landmark baseline drift", "%", "baseline_drift_percent", "reconstruction.baseline_drift_median_percent"),
+    ):
+        values = frames[column].dropna().to_numpy()
+        q1, median, q3, p95 = np.percentile(values, [25, 50, 75, 95])
+        rows.append(
+            {
+                "metric": metric,
+                "unit": unit,
+                "median": float(median),
+                "q1": float(q1),
+                "q3": float(q3),
+                "p95": float(p95),
+                "limit": limits[limit].text(),
+            }
+        )
+    return rows
+
+
+def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
+    """The article's Table 3: what was reconstructed at the start of the window, and what the model started with."""
+    told = read_json(stage.read("driver", "initial_velocity.json"))
+    return [
+        {
+            "item": item,
+            "unit": unit,
+            "reconstruction": told[key],
+            "applied": [float(v) for v in vectors[0]],
+        }
+        for item, unit, key, vectors in (
+            ("velocity of the skull CG", "m/s", "velocity_m_per_s", applied.velocity_m_per_s),
+            ("angular velocity", "rad/s", "omega_rad_per_s", applied.angular_velocity_rad_per_s),
+        )
+    ]
+
+
+def _columns(motion: Motion) -> pd.DataFrame:
+    out = {"time_s": motion.time_s}
+    for axis, k in zip("xyz", range(3)):
+        out[f"{axis}_m"] = motion.position_m[:, k]
+        out[f"v{axis}_m_per_s"] = motion.velocity_m_per_s[:, k]
+        out[f"a{axis}_m_per_s2"] = motion.acceleration_m_per_s2[:, k]
+        out[f"omega_{axis}_rad_per_s"] = motion.angular_velocity_rad_per_s[:, k]
+        out[f"alpha_{axis}_rad_per_s2"] = motion.angular_acceleration_rad_per_s2[:, k]
+    for k, axis in enumerate("xyzw"):
+        out[f"q{axis}"] = motion.quaternion[:, k]
+    return pd.DataFrame(out)
+
+
+def _parts(stage: Stage, model: Model) -> list[dict[str, Any]]:
+    """The article's Table 1 for this model."""
+    table = _table(stage, "assembly", "parts.csv")
+    rows = []
+    for row in table.to_dict("records"):
+        parameters = model.materials[row["material"]]["parameters"]
+        rows.append(
+            {
+                "part": row["name"],
+                "material": row["material"],
+                "density_kg_per_m3": row["density_kg_per_m3"],
+                "youngs_modulus_pa": parameters.get("youngs_modulus_pa"),
+                "poisson_ratio": parameters.get("poisson_ratio"),
+                "elements": row["elements"],
+                "nodes": row["nodes"],
+                "volume_m3": row["volume_m3"],
+                "mass_kg": row["mass_kg"],
+            }
+        )
+    return rows
+
+
+def _parameters(model: Model) -> list[dict[str, Any]]:
+    rows = []
+    for name, facts in model.materials.items():
+        values = {"density_kg_per_m3": facts["density_kg_per_m3"], **facts["parameters"]}
+        for parameter, value in values.items():
+            if _is_curve(value):
+                continue
+            certainty = facts["certainty"]
+            rows.append(
+                {
+                    "material": name,
+                    "parameter": parameter,
+                    "value": value,
+                    "unit": "",
+                    "certainty": certainty.get(parameter, "") if isinstance(certainty, dict) else certainty,
+                    "source": facts["source"],
+                }
+            )
+    return rows
+
+
+def _is_curve(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str)
+
+
+def _mesh(model: Model) -> MeshView:
+    roles = np.array([part.role for part in model.parts])
+    return MeshView(model.nodes, model.hexes, roles[model.element_part])
+
+
+def _snapshots(stage: Stage, model: Model) -> Snapshots:
+    time, ids, values = read_snapshots(stage.read("replay", "brain_snapshots.h5"))
+    row = {int(number): k for k, number in enumerate(model.element_ids)}
+    return Snapshots(time, np.array([row[int(i)] for i in ids]), values)
+
+
+def _provenance(stage: Stage, model: Model) -> dict[str, Any]:
+    out: dict[str, Any] = {"replay": __version__, **stage.manifest_of("assembly").versions}
+    out["model preset and resolution"] = f"{model.info['preset']}, {model.info['resolution']}"
+    if stage.made("replay", "run.json"):
+        run = read_json(stage.read("replay", "run.json"))
+        out |= {
+            "solver state": run["state_hash"],
+            "solver model": run["model_hash"],
+            "solver code": run["code_hash"],
+            "steps": run["steps"],
+        }
+    return out
