@@ -211,7 +211,7 @@ def _sentence(
         choices = str(ctx.get("expected") or ctx.get("expected_tags"))
         shown = ctx.get("tag", value)
         plain = [c.strip(" '") for c in choices.replace(" or ", ",").split(",")]
-        close = difflib.get_close_matches(str(shown), plain, n=1)
+        close = difflib.get_close_matches(str(shown), plain, n=1, cutoff=0.4)
         found, expected = f"{_shown(shown)} is not a choice", choices
         mend = f"did you mean `{close[0]}`?" if close else "choose one of these"
     elif kind == "union_tag_not_found":

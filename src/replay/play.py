@@ -353,15 +353,15 @@ class Play(Setting):
         """Folder of the play, where the files it names lie."""
         return self._folder
 
-    def lying_in(self, folder: Path) -> Play:
-        """This play with the files it names in another folder."""
-        play = self.model_copy()
-        play._folder = Path(folder)
-        return play
-
     def file(self, name: str) -> Path:
         """Path of a file that the play names."""
         return self._folder / name
+
+    def lying_in(self, folder: Path) -> Play:
+        """Return the same play with the files it names in another folder (the checked copies of a run)."""
+        moved = self.model_copy()
+        moved._folder = Path(folder)
+        return moved
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -403,6 +403,15 @@ def load_play(path: Path) -> Play:
 def play_schema() -> dict[str, Any]:
     """JSON schema of ``play.yaml``, for editors and for the workflow."""
     schema = Play.model_json_schema()
+    for model, block in ((Play, schema), (SolverSettings, schema["$defs"]["SolverSettings"])):
+        for name, info in model.model_fields.items():
+            # pydantic leaves these two out where a block of settings is its own default
+            block["properties"][name].setdefault("description", info.description)
+            if info.default_factory is not None:
+                value = info.get_default(call_default_factory=True, validated_data={})
+                block["properties"][name]["default"] = (
+                    value.model_dump(mode="json") if isinstance(value, Setting) else value
+                )
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 
