@@ -1,0 +1,34 @@
+"""Decks for other solvers: the article's Velodyne-style card and LS-DYNA keyword files."""
+
+from replay.decks.deck import (
+    DeckControls,
+    DeckInput,
+    DeckPart,
+    Driver,
+    FrictionPair,
+    FrictionType,
+    InitialVelocity,
+    PartSet,
+    axis_through,
+    deck_parts,
+)
+from replay.decks.keyword_reader import read_keyword
+from replay.decks.lsdyna import write_lsdyna
+from replay.decks.velodyne import read_velodyne, write_velodyne
+
+__all__ = [
+    "DeckControls",
+    "DeckInput",
+    "DeckPart",
+    "Driver",
+    "FrictionPair",
+    "FrictionType",
+    "InitialVelocity",
+    "PartSet",
+    "axis_through",
+    "deck_parts",
+    "read_keyword",
+    "read_velodyne",
+    "write_lsdyna",
+    "write_velodyne",
+]
