@@ -32,6 +32,9 @@ from replay.solver.watchdog import check_speed, check_step, speed_limit
 #: Steps a history interval is cut into where nothing deforms and no element bounds the step.
 _RIGID_STEPS = 20
 
+#: Fewer blocks of elements are not worth another thread.
+_BLOCKS_PER_THREAD = 32
+
 
 @dataclass(frozen=True)
 class RunSummary:
@@ -324,10 +327,12 @@ def solve(
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     before = numba.get_num_threads()
-    numba.set_num_threads(min(threads, before) if threads else before)
     try:
         with Signals() as signals:
             run = _Run(problem, folder, recorders, resume, progress)
+            # a thread that waits longer than it works is a loss; the result does not depend on it
+            worthwhile = max(run.integrator.layout.n_blocks // _BLOCKS_PER_THREAD, 1)
+            numba.set_num_threads(min(threads or before, before, worthwhile))
             try:
                 run.go(signals)
             except InstabilityError as error:
