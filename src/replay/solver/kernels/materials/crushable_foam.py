@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 from replay.solver.kernels.device import device
 from replay.solver.kernels.element import Moduli
@@ -116,9 +117,9 @@ class Parameters:
                 refuse(f"the curve has {len(strains)} points; 2 to {KNOTS} can be used")
             if strains[0] != 0 or stresses[0] != 0:
                 refuse(f"the curve starts at ({strains[0]!r}, {stresses[0]!r}); it must start at (0, 0)")
-            if any(b <= a for a, b in zip(strains, strains[1:])) or not strains[-1] < 1:
+            if any(b <= a for a, b in pairwise(strains)) or not strains[-1] < 1:
                 refuse("curve_strains must increase and stay below 1")
-            if any(b < a for a, b in zip(stresses, stresses[1:])) or not stresses[1] > 0:
+            if any(b < a for a, b in pairwise(stresses)) or not stresses[1] > 0:
                 refuse("curve_stresses_pa must not fall, and must rise from the start")
 
     def loading_curve(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -142,7 +143,7 @@ class Parameters:
         """Settings of the kernel, then the places and the slope changes of the ramps that make phi [Pa]."""
         strains, stresses = self.loading_curve()
         slopes = [(b - a) / (t - s) for a, b, s, t in zip(stresses, stresses[1:], strains, strains[1:])]
-        changes = [slopes[0], *(b - a for a, b in zip(slopes, slopes[1:]))]
+        changes = [slopes[0], *(b - a for a, b in pairwise(slopes))]
         places = list(strains[:-1])
         places += [0.0] * (KNOTS - len(places))
         changes += [0.0] * (KNOTS - len(changes))
