@@ -16,6 +16,7 @@ crushable_foam     *MAT_CRUSHABLE_FOAM (063)            rate effect and hysteres
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -26,6 +27,7 @@ import numpy as np
 from replay.decks.deck import DeckInput, DeckPart
 from replay.decks.slurm import write_submit
 from replay.files import write_text
+from replay.solver.kernels.materials import crushable_foam
 
 _RIGID_DOF = {0: 1, 1: 2, 2: 3, 3: 5, 4: 6, 5: 7}
 _CURVE_BASE = 900
@@ -168,19 +170,14 @@ def one_decay(shear_pa: float, ratios: Sequence[float], times_s: Sequence[float]
     return shear_pa, shear_pa * (1 - total), 1 / time
 
 
-def foam_curve(parameters: Mapping[str, Any]) -> tuple[list[float], list[float]]:
-    """Volumetric strain (compression positive) against stress [Pa] of a crushable foam."""
-    curve = parameters.get("curve")
-    if curve:
-        return [float(v) for v in curve[0]], [float(v) for v in curve[1]]
-    if "curve_strain" in parameters:
-        return [float(v) for v in parameters["curve_strain"]], [float(v) for v in parameters["curve_stress_pa"]]
-    young, plateau = float(parameters["youngs_modulus_pa"]), float(parameters["plateau_stress_pa"])
-    dense = float(parameters.get("densification_strain", 0.65))
-    knee = plateau / young
-    strain = [0.0, knee, dense, (dense + 1) / 2, 0.95]
-    stress = [0.0, plateau, 1.5 * plateau, 6 * plateau, max(40 * plateau, 0.5 * young)]
-    return strain, stress
+def foam_curve(parameters: Mapping[str, Any]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Compressive strain against stress [Pa] of a crushable foam: the curve that our own law follows.
+
+    Without lateral strain the nominal strain is the volumetric one, and the nominal stress is the true one.
+    """
+    known = {f.name for f in dataclasses.fields(crushable_foam.Parameters)}
+    law = crushable_foam.Parameters(**{name: value for name, value in parameters.items() if name in known})
+    return law.loading_curve()
 
 
 def _material_lines(part: DeckPart) -> list[str]:
@@ -203,7 +200,7 @@ def _material_lines(part: DeckPart) -> list[str]:
         return ["*MAT_VISCOELASTIC", head, _card(mid, density, p["bulk_modulus_pa"], short, long, rate)]
     if part.law == "crushable_foam":
         strain, stress = foam_curve(p)
-        tension = float(p.get("tension_cutoff_pa", stress[1]))
+        tension = float(p.get("tension_cutoff_pa", p["plateau_stress_pa"]))
         return [
             "*MAT_CRUSHABLE_FOAM",
             _fields("mid", "ro", "e", "pr", "lcid", "tsc", "damp"),

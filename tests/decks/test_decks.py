@@ -1,0 +1,296 @@
+"""Decks say what they were given, and a reader gets it back."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from replay.decks import (
+    DeckControls,
+    DeckInput,
+    DeckPart,
+    Driver,
+    FrictionPair,
+    InitialVelocity,
+    PartSet,
+    axis_through,
+    deck_parts,
+    read_keyword,
+    read_velodyne,
+    write_lsdyna,
+    write_velodyne,
+)
+from replay.decks.lsdyna import foam_curve, one_decay
+from replay.errors import InputError
+
+ELASTIC = {"youngs_modulus_pa": 3.356e9, "poisson_ratio": 0.43}
+FOAM = {"youngs_modulus_pa": 10.5e6, "plateau_stress_pa": 0.35e6, "densification_strain": 0.65}
+BRAIN = {
+    "bulk_modulus_pa": 2.19e9,
+    "shear_modulus_pa": 6e3,
+    "prony_ratios": [0.5, 0.3],
+    "prony_times_s": [0.01, 0.1],
+}
+PARTS = (
+    DeckPart(60000001, "brain", "viscohyperelastic", 1012.345678, BRAIN, "head"),
+    DeckPart(60000002, "csf", "fluid", 1040.0, {"bulk_modulus_pa": 2.19e9, "shear_modulus_pa": 1e3}, "head"),
+    DeckPart(60000003, "skull", "rigid", 1357.0, {"youngs_modulus_pa": 12.04e9, "poisson_ratio": 0.22}, "head"),
+    DeckPart(60009020, "scalp", "elastic", 1200.0, {"youngs_modulus_pa": 16.7e6, "poisson_ratio": 0.42}, "head"),
+    DeckPart(10000174, "comfort_pad_crown", "crushable_foam", 84.3, FOAM, "helmet"),
+    DeckPart(10000180, "comfort_pad_jaw", "crushable_foam", 84.3, FOAM, "helmet"),
+    DeckPart(10000184, "energy_pad_crown", "crushable_foam", 84.3, FOAM, "helmet"),
+    DeckPart(10000181, "chin_cup", "crushable_foam", 84.3, FOAM, "helmet"),
+    DeckPart(10000001, "shell", "elastic", 1500.0, ELASTIC, "helmet"),
+)
+
+
+@pytest.fixture
+def deck() -> DeckInput:
+    """A column of hexes, one a part, tied to each other by shared nodes, at awkward coordinates."""
+    rng = np.random.default_rng(5)
+    count = len(PARTS)
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * 0.0213
+    nodes = np.vstack([square + np.array([0, 0, 0.0171 * k]) for k in range(count + 1)])
+    nodes = nodes + rng.normal(scale=1e-3, size=nodes.shape) - 0.11
+    hexes = np.arange(8)[None] + 4 * np.arange(count)[:, None]
+    omega = np.array([2.0, 45.01, -0.7])
+    speed, p, q = axis_through([0.01, -0.02, 0.03], omega)
+    time = np.linspace(0, 0.03, 61)
+    return DeckInput(
+        title="a test deck",
+        nodes=nodes,
+        node_ids=60_000_001 + np.arange(len(nodes)),
+        hexes=hexes,
+        element_ids=10_000_001 + np.arange(count),
+        element_part=np.arange(count),
+        parts=PARTS,
+        part_sets=(
+            PartSet(10000099, "H1_pads_set1", (10000174, 10000180)),
+            PartSet(10000100, "H1_pads_set2", (10000184,)),
+            PartSet(99, "all_parts", tuple(part.pid for part in PARTS)),
+        ),
+        initial_velocities=(InitialVelocity(99, (0.2, 8.3232, 0.0), speed, p, q),),
+        driver=Driver(60000003, time, np.cos(np.outer(time, [90, 50, 70])), 40 * np.sin(np.outer(time, [80, 30, 60]))),
+        notes=("pads share nodes with the scalp",),
+    )
+
+
+def test_keyword_deck_reads_back_to_field_precision(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path, deck)
+    back = read_keyword(tmp_path / "main.k")
+    assert sorted(back.nodes) == sorted(deck.node_ids.tolist())
+    read = np.array([back.nodes[i] for i in deck.node_ids.tolist()])
+    np.testing.assert_allclose(read, deck.nodes, rtol=1e-11, atol=1e-12)
+    for k, element in enumerate(deck.element_ids.tolist()):
+        part, nodes = back.solids[element]
+        assert part == deck.parts[deck.element_part[k]].pid
+        assert list(nodes) == deck.node_ids[deck.hexes[k]].tolist()
+    assert back.parts == {p.pid: (p.name, p.pid, p.pid) for p in deck.parts}
+    assert back.part_sets == {s.sid: (s.name, s.pids) for s in deck.part_sets}
+
+
+def test_keyword_controls_are_the_articles(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path, deck)
+    cards = read_keyword(tmp_path / "main.k").cards
+    assert cards["*CONTROL_TERMINATION"] == (0.03,)
+    assert cards["*CONTROL_TIMESTEP"] == (0.0, 0.9, 0, 0.0, -1.92e-7)
+    assert cards["*CONTROL_HOURGLASS"] == (4, 0.1)
+    assert cards["*CONTROL_BULK_VISCOSITY"] == (1.2, 0.06, 1)
+    assert cards["*DATABASE_BINARY_D3PLOT"] == (1e-3,)
+
+
+def test_materials_are_mapped_as_the_table_says(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path, deck)
+    back = read_keyword(tmp_path / "main.k")
+    keywords = {pid: keyword for pid, (keyword, _) in back.materials.items()}
+    assert keywords[60000001] == keywords[60000002] == "*MAT_VISCOELASTIC"
+    assert keywords[60000003] == "*MAT_RIGID"
+    assert keywords[60009020] == keywords[10000001] == "*MAT_ELASTIC"
+    assert keywords[10000174] == "*MAT_CRUSHABLE_FOAM"
+    density, bulk, short, long, rate = back.materials[60000001][1]
+    assert density == pytest.approx(1012.345678, rel=1e-6)
+    assert (bulk, short, long) == (2.19e9, 6000, pytest.approx(1200))
+    assert 1 / rate == pytest.approx((0.5 * 0.01 + 0.3 * 0.1) / 0.8, rel=1e-6)
+    curve = np.array(back.curves[10000174])
+    np.testing.assert_allclose(curve.T, foam_curve(FOAM), rtol=1e-12)
+    assert curve[1, 1] / curve[1, 0] == pytest.approx(FOAM["youngs_modulus_pa"], rel=0.1)
+    assert (np.diff(curve[:, 1]) >= 0).all()
+
+
+def test_one_decay_keeps_both_moduli_and_the_area_of_relaxation() -> None:
+    short, long, rate = one_decay(6000.0, [0.5, 0.3], [0.01, 0.1])
+    t = np.linspace(0, 3, 300_001)
+    prony = 6000 * (1 - 0.8 + 0.5 * np.exp(-t / 0.01) + 0.3 * np.exp(-t / 0.1))
+    single = long + (short - long) * np.exp(-rate * t)
+    assert prony[0] == pytest.approx(single[0])
+    assert np.trapezoid(prony - single, t) == pytest.approx(0, abs=1e-4 * np.trapezoid(prony - long, t))
+    assert one_decay(1000.0, [], []) == (1000.0, 1000.0, 0.0)
+
+
+def test_the_axis_through_p_and_q_gives_back_the_angular_velocity(tmp_path: Path, deck: DeckInput) -> None:
+    """Rigid velocity from the card equals v + omega x r of the original at any point."""
+    omega, centre, v = np.array([2.0, 45.01, -0.7]), np.array([0.01, -0.02, 0.03]), np.array([0.2, 8.3232, 0.0])
+    points = np.random.default_rng(1).normal(size=(20, 3))
+    expected = v + np.cross(omega, points - centre)
+    write_velodyne(tmp_path / "velodyne", deck)
+    (card,) = read_velodyne(tmp_path / "velodyne" / "velodyne.card").initial_velocities
+    p, q = np.array(card.p_m), np.array(card.q_m)
+    axis = (q - p) / np.linalg.norm(q - p)
+    ours = np.array(card.velocity_m_per_s) + card.omega_rad_per_s * np.cross(axis, points - p)
+    np.testing.assert_allclose(ours, expected, atol=1e-12)
+    write_lsdyna(tmp_path / "lsdyna", deck)
+    (fields,) = read_keyword(tmp_path / "lsdyna" / "main.k").initial_velocities
+    assert fields[:2] == (99, 1)
+    other = np.array(fields[3:6]) + fields[2] * np.cross(fields[9:12], points - np.array(fields[6:9]))
+    np.testing.assert_allclose(other, expected, atol=3e-4)  # ten-column fields
+
+
+def test_a_body_at_rest_has_an_axis_too() -> None:
+    speed, p, q = axis_through([1.0, 2.0, 3.0], [0.0, 0.0, 0.0])
+    assert speed == 0
+    assert q == (1.0, 2.0, 4.0)
+    assert p == (1.0, 2.0, 3.0)
+
+
+def test_the_driver_is_six_velocity_curves_of_the_skull(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path, deck)
+    back = read_keyword(tmp_path / "main.k")
+    assert deck.driver is not None
+    assert [card[:3] for card in back.prescribed] == [(60000003, dof, 0) for dof in (1, 2, 3, 5, 6, 7)]
+    values = np.hstack([deck.driver.velocity_m_per_s, deck.driver.omega_rad_per_s])
+    for k, card in enumerate(back.prescribed):
+        curve = np.array(back.curves[int(card[3])])
+        np.testing.assert_allclose(curve[:, 0], deck.driver.time_s, rtol=1e-12)
+        np.testing.assert_allclose(curve[:, 1], values[:, k], rtol=1e-12, atol=1e-14)
+
+
+def test_the_card_says_section_3_of_the_protocol(tmp_path: Path, deck: DeckInput) -> None:
+    write_velodyne(tmp_path, deck)
+    card = read_velodyne(tmp_path / "velodyne.card")
+    assert card.settings == {
+        "Solution type": (0,),
+        "Global memory size": (32,),
+        "Termination time": (30.0e-3,),
+        "Time step scale factor": (0.9,),
+        "Plot state frequency": (1.0e-3, 0),
+        "Time history frequency": (1.0e-3, 0),
+        "Hourglass stabilization method": (4,),
+        "Hourglass stabilization coefficient": (0.10,),
+        "Bulk viscosity": (1,),
+        "Quadratic bulk viscosity": (1.2,),
+        "Linear bulk viscosity": (0.06,),
+        "Mass scaling timestep": (1.92e-7,),
+        "Mass scaling restart option": (1,),
+        "Mass scaling part definition": (99, 1),
+        "Contact scheme": (3,),
+        "Curvature based adaptive contact option": (3,),
+        "Contact constraint type": (0,),
+        "Max number of contact iterations": (20,),
+        "Contact convergence tolerance": (1.0e-3,),
+    }
+    assert card.part_sets[99] == (1, 899999999, "All_parts_in_range")
+    assert card.part_sets[10000099] == (10000174, 10000180, "H1_pads_set1")
+    assert card.friction_pairs == deck.friction_pairs
+    assert card.friction_types == deck.friction_types
+    assert card.initial_velocities == deck.initial_velocities
+    text = (tmp_path / "velodyne.card").read_text()
+    assert text.index("Include: helmet_H1.k") < text.index("Contact scheme") < text.index("Friction pair")
+
+
+def test_other_controls_reach_both_decks(tmp_path: Path, deck: DeckInput) -> None:
+    other = dataclasses.replace(deck, controls=DeckControls(termination_time_s=1e-3, hourglass_coefficient=0.05))
+    write_velodyne(tmp_path / "v", other)
+    write_lsdyna(tmp_path / "l", other)
+    assert read_velodyne(tmp_path / "v" / "velodyne.card").settings["Termination time"] == (1e-3,)
+    assert read_keyword(tmp_path / "l" / "main.k").cards["*CONTROL_HOURGLASS"] == (4, 0.05)
+
+
+def test_every_field_keeps_to_its_columns(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path, deck)
+    for path in tmp_path.glob("*.k"):
+        keyword = ""
+        for line in path.read_text().splitlines():
+            assert line.isascii()
+            if line.startswith("*"):
+                keyword = line
+            elif not line.startswith("$") and keyword == "*NODE":
+                assert len(line) == 8 + 3 * 16 + 2 * 8
+                assert line[8] == line[24] == line[40] == " " or "-" in line
+            elif not line.startswith("$") and keyword not in ("*TITLE", "*PART", "*INCLUDE"):
+                assert len(line) <= 80
+
+
+def test_the_batch_script_is_a_script(tmp_path: Path, deck: DeckInput) -> None:
+    for folder, write in (("l", write_lsdyna), ("v", write_velodyne)):
+        assert tmp_path / folder / "submit.slurm.sh" in write(tmp_path / folder, deck)
+        script = tmp_path / folder / "submit.slurm.sh"
+        assert script.read_text().startswith("#!/bin/bash\n#SBATCH")
+        assert subprocess.run(["bash", "-n", str(script)], check=False).returncode == 0
+
+
+def test_the_same_deck_has_the_same_bytes(tmp_path: Path, deck: DeckInput) -> None:
+    for folder in ("a", "b"):
+        write_lsdyna(tmp_path / folder, deck)
+        write_velodyne(tmp_path / folder, deck)
+    for path in sorted((tmp_path / "a").iterdir()):
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"node_ids": np.full(40, 7)}, "node numbers occur twice"),
+        ({"element_ids": 10**9 + np.arange(9)}, "eight-column"),
+        ({"nodes": np.full((40, 3), np.nan)}, "cannot stand in a deck"),
+        ({"part_sets": (PartSet(5, "odd", (10000001, 10000184)),)}, "would also hold"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    tmp_path: Path, deck: DeckInput, change: dict[str, Any], match: str
+) -> None:  # fmt: skip
+    with pytest.raises(ValueError, match=match):
+        write_velodyne(tmp_path, dataclasses.replace(deck, **change))
+
+
+def test_an_unknown_law_is_refused(tmp_path: Path, deck: DeckInput) -> None:
+    jelly = (dataclasses.replace(PARTS[0], law="jelly"), *PARTS[1:])
+    with pytest.raises(ValueError, match="law 'jelly' has no keyword"):
+        write_lsdyna(tmp_path, dataclasses.replace(deck, parts=jelly))
+
+
+def test_a_damaged_deck_names_its_line(tmp_path: Path, deck: DeckInput) -> None:
+    write_velodyne(tmp_path, deck)
+    card = tmp_path / "velodyne.card"
+    lines = card.read_text().splitlines()
+    row = next(k for k, line in enumerate(lines) if line.startswith("Friction pair"))
+    lines[row] = "Friction pair definition: 60009020 scalp 1 exteriorfric"
+    card.write_text("\n".join(lines))
+    with pytest.raises(InputError, match=rf"velodyne.card:{row + 1}: .*scalp"):
+        read_velodyne(card)
+    write_lsdyna(tmp_path, deck)
+    (tmp_path / "main.k").write_text("*KEYWORD\n*CONTROL_TERMINATION\n    thirty\n*END\n")
+    with pytest.raises(InputError, match=r"main.k:2: \*CONTROL_TERMINATION cannot be read"):
+        read_keyword(tmp_path / "main.k")
+
+
+def test_deck_parts_take_whatever_has_the_attributes_of_a_part() -> None:
+    @dataclasses.dataclass
+    class Anything:
+        pid: int = 7
+        name: str = "bit"
+        material: str = "stuff"
+        assembly: str = "head"
+
+    (part,) = deck_parts([Anything()], {"stuff": {"law": "elastic", "density_kg_per_m3": 1, "parameters": ELASTIC}})
+    assert part == DeckPart(7, "bit", "elastic", 1.0, ELASTIC, "head")
+
+
+def test_friction_pairs_can_be_replaced(tmp_path: Path, deck: DeckInput) -> None:
+    pairs = (FrictionPair(60009020, 10000181, 2, "only_the_cup"),)
+    write_velodyne(tmp_path, dataclasses.replace(deck, friction_pairs=pairs))
+    assert read_velodyne(tmp_path / "velodyne.card").friction_pairs == pairs
