@@ -137,7 +137,7 @@ def test_a_mistake_is_named_with_what_was_expected(demo, old, new, expected):
         ("axes: sae_j211", "axes: {x: +x, y: +y, z: -z}", "mirror"),
         ("axes: sae_j211", "axes: sae", "did you mean `sae_j211`?"),
         ("unit: deg/s}", "unit: degs}", "did you mean `deg/s`?"),
-        ("kind: cfc,", "kind: cfcc,", "did you mean `cfc`?"),
+        ("kind: butterworth,", "kind: buterworth,", "did you mean `butterworth`?"),
         ("unit: g}", "}", "source.columns.acceleration.unit: is missing"),
         ("  sensor_to_cg_m: [-0.075, 0.0, 0.055]", "  #", "source.sensor_to_cg_m: is missing"),
         ("[0.074773, -0.001055, -0.853344, 0.515957]", "[0, 0, 0, 2]", "unit quaternion"),

@@ -219,6 +219,12 @@ class WearableSource(Setting):
         "{kind: butterworth, cutoff_hz: 200}.",
         examples=[{"kind": "none"}],
     )
+    acceleration_range_m_per_s2: Positive | None = Field(
+        default=None, description="Full range of the accelerometer, each axis [m/s^2]; a peak at it is clipped."
+    )
+    angular_velocity_range_rad_per_s: Positive | None = Field(
+        default=None, description="Full range of the gyroscope, each axis [rad/s]; a peak at it is clipped."
+    )
     gravity: Literal["removed", "included"] = Field(
         default="removed", description="`included` where a head at rest reads 1 g upward; it is then taken out."
     )
@@ -284,6 +290,11 @@ class ModelChoice(Setting):
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
     resolution: Literal["tiny", "coarse"] = Field(default="coarse", description="Mesh resolution.")
+    helmet_structure: Literal["rigid", "deformable"] = Field(
+        default="rigid",
+        description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "
+        "hourglass gate refuses at these resolutions.",
+    )
 
 
 class Hourglass(Setting):

@@ -64,6 +64,17 @@ def test_gravity_is_taken_out_where_the_play_says_it_is_in(wearable):
     assert np.abs(k.acceleration_m_per_s2).max() < 1e-9
 
 
+def test_clipping_and_the_range_that_was_used_are_reported(wearable):
+    path = wearable / "wearable.csv"
+    values = reconstruct(load_play(wearable)).quality.gate_values()
+    assert values["saturated_samples"] == 0
+    assert 0.1 < values["range_used"] < 0.95
+    table = pd.read_csv(path)
+    table["ay_g"] = table["ay_g"].clip(-30.0, 30.0)
+    table.to_csv(path, index=False)
+    assert reconstruct(load_play(wearable)).quality.gate_values()["saturated_samples"] >= 3
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [

@@ -47,6 +47,10 @@ CASES = (
 )
 
 
+SEEDS = range(5)
+"""Seeds of the click noise."""
+
+
 @dataclass(frozen=True)
 class Row:
     """Medians over the seeds: recovered peak over true peak, and errors."""
@@ -61,7 +65,7 @@ class Row:
     orientation_error_deg: float
 
 
-def measure(case: Case, seeds: range) -> Row:
+def measure(case: Case, seeds: range = SEEDS) -> Row:
     """Reconstruct one case for every seed and compare with the truth.
 
     True peaks are those of the continuous motion, not of its samples; the orientation error is the root mean
@@ -114,11 +118,15 @@ HEADER = (
 )
 
 
-def table(seeds: range = range(5)) -> str:
-    """Markdown table over all cases; peaks are recovered over true."""
-    rows = (measure(case, seeds) for case in CASES)
-    return HEADER + "".join(
-        f"| {r.name} | {r.omega_ratio:.2f} | {r.alpha_ratio:.2f} | {r.across_ratio:.2f} | {r.along_ratio:.2f} "
-        f"| {r.omega_rmse_rad_per_s:.2f} | {r.t0_error_ms:.1f} | {r.orientation_error_deg:.2f} |\n"
-        for r in rows
+def line(row: Row) -> str:
+    """One line of the table; peaks are recovered over true."""
+    return (
+        f"| {row.name} | {row.omega_ratio:.2f} | {row.alpha_ratio:.2f} "
+        f"| {row.across_ratio:.2f} | {row.along_ratio:.3g} "
+        f"| {row.omega_rmse_rad_per_s:.2f} | {row.t0_error_ms:.1f} | {row.orientation_error_deg:.2f} |\n"
     )
+
+
+def table(cases: tuple[Case, ...] = CASES, seeds: range = SEEDS) -> str:
+    """Markdown table over cases."""
+    return HEADER + "".join(line(measure(case, seeds)) for case in cases)

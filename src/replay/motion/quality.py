@@ -243,7 +243,9 @@ def wearable_quality(
             "filter_cutoff_over_nyquist": (
                 "no filter was asked for" if cutoff is None else cutoff / (0.5 * motion.rate_hz)
             ),
-            "range_used": "the play does not state the sensor's range",
+            "range_used": (
+                "the play does not state the sensor's range" if motion.range_used is None else motion.range_used
+            ),
             "saturated_samples": motion.saturated_samples,
             "missing_samples": 0,
             "window_covered": bool(window[0] >= k.time_s[0] - 1e-9 and window[1] <= k.time_s[-1] + 1e-9),

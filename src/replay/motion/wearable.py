@@ -59,6 +59,8 @@ class WearableMotion:
         Median sampling rate; greatest deviation of an interval.
     cutoff_hz
         -3 dB of the filter; None without one.
+    range_used
+        Greatest raw value over the sensor's full range; None where the play states no range.
     saturated_samples
         Samples in runs of three or more equal values at a channel's extreme.
     """
@@ -67,6 +69,7 @@ class WearableMotion:
     rate_hz: float
     jitter_percent: float
     cutoff_hz: float | None
+    range_used: float | None
     saturated_samples: int
 
 
@@ -142,8 +145,9 @@ def _refuse_uneven(path: Path, column: str, time: np.ndarray, lines: list[int]) 
             mend="sort the rows, and remove repeated ones",
         )
     step = float(np.median(steps))
-    worst = int(np.argmax(np.abs(steps - step)))
-    if abs(steps[worst] - step) > LARGEST_JITTER * step:
+    off = np.abs(steps - step) > LARGEST_JITTER * step
+    if off.any():
+        worst = int(np.argmax(off))
         raise InputError(
             path,
             f"the samples are uneven: {steps[worst] * 1e3:.4g} ms here, {step * 1e3:.4g} ms elsewhere",
@@ -209,13 +213,27 @@ def reconstruct_wearable(path: Path, source: WearableSource) -> WearableMotion:
     position = np.array(source.initial_velocity_m_per_s) * (even - even[0])[:, None] + curve.antiderivative(2)(even)
     motion = Kinematics(even, position, rotation, velocity, a_global, rotation.apply(omega), rotation.apply(alpha))
     steps = np.diff(time)
+    used = [
+        float(np.abs(channels[key]).max()) / limit
+        for key, limit in (
+            ("acceleration", source.acceleration_range_m_per_s2),
+            ("angular_velocity", source.angular_velocity_range_rad_per_s),
+        )
+        if limit is not None
+    ]
     return WearableMotion(
         kinematics=motion,
-        rate_hz=float(1.0 / np.median(steps)),
+        rate_hz=_rounded(1.0 / float(np.median(steps))),
         jitter_percent=100.0 * float(np.abs(steps / np.median(steps) - 1.0).max()),
         cutoff_hz=filter_cutoff(source.filter),
+        range_used=max(used) if used else None,
         saturated_samples=sum(_saturated(values[:, i]) for values in channels.values() for i in range(3)),
     )
+
+
+def _rounded(rate_hz: float) -> float:
+    """Nine digits of a rate: 1 ms written in binary is not quite 1 kHz."""
+    return float(f"{rate_hz:.9g}")
 
 
 def _saturated(values: np.ndarray) -> int:
