@@ -33,14 +33,26 @@ NOTES = (
     "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
     "straps are not modelled; their anchors are node sets",
-    "shell and skull are one hex thick: bending of the shell is carried by hourglass stiffness",
     "head surfaces are analytic (ellipsoids), not a person's anatomy",
 )
+STRUCTURE_ROLES = ("shell", "facemask")
+STRUCTURE_NOTES = {
+    "rigid": (
+        "shell and facemask are one rigid body: one hex across a wall or a bar bends by hourglass modes alone, which "
+        "are no mechanics; with `helmet_structure: deformable` they are elastic, and the hourglass gate judges it"
+    ),
+    "deformable": "shell and facemask are elastic, one hex across: their bending is carried by hourglass stiffness",
+}
 _QUALITY_TARGET = 0.30
 
 
 def build_model(
-    preset: str = "nfl", resolution: str = "coarse", helmet_mass_kg: float | None = None, *, helmet: bool = True
+    preset: str = "nfl",
+    resolution: str = "coarse",
+    helmet_mass_kg: float | None = None,
+    *,
+    helmet: bool = True,
+    helmet_structure: str = "rigid",
 ) -> Model:
     """Build head and helmet.
 
@@ -54,6 +66,8 @@ def build_model(
         Mass of the physical helmet [kg]; the preset's where None.
     helmet
         False for a bare head.
+    helmet_structure
+        ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
 
     Returns
     -------
@@ -63,8 +77,11 @@ def build_model(
     Raises
     ------
     ValueError
-        For an unknown preset or resolution, or a mass that is not positive.
+        For an unknown preset, resolution or structure, or a mass that is not positive.
     """
+    if helmet_structure not in STRUCTURE_NOTES:
+        message = f"no helmet structure {helmet_structure!r}; there are {', '.join(STRUCTURE_NOTES)}"
+        raise ValueError(message)
     if resolution not in RESOLUTIONS:
         message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
         raise ValueError(message)
@@ -84,6 +101,10 @@ def build_model(
     in_brain = element_part == index["brain"]
     regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
     materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target)
+    if helmet_structure == "rigid":
+        for part in parts:
+            if part.role in STRUCTURE_ROLES:
+                materials[part.material]["law"] = "rigid"
     density = np.array([materials[part.material]["density_kg_per_m3"] for part in parts])[element_part]
     in_head = np.array([part.assembly == "head" for part in parts])[element_part]
     cg = mass_properties(nodes, hexes[in_head], density[in_head]).cg_m
@@ -114,7 +135,8 @@ def build_model(
             "calibration": calibration,
             "guard_moved_nodes": int(moved),
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
-            "notes": list(NOTES),
+            "helmet_structure": helmet_structure if helmet else None,
+            "notes": [*NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
         },
     )
 

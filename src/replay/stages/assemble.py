@@ -19,7 +19,12 @@ def run(workspace: Workspace) -> str | None:
     stage = Stage(workspace, "assembly", after=["settings"])
     play = read_settings(stage)
     limits = limits_of(stage)
-    model = models.build_model(play.model.preset, play.model.resolution, helmet_mass_kg=play.helmet.mass_kg)
+    model = models.build_model(
+        play.model.preset,
+        play.model.resolution,
+        helmet_mass_kg=play.helmet.mass_kg,
+        helmet_structure=play.model.helmet_structure,
+    )
     print(models.summary_text(model))
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
     models.write_parts_table(stage.write("parts.csv", "parts with material, volume, mass and quality"), model)

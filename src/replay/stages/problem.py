@@ -69,7 +69,7 @@ def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Pr
         controls=controls,
         initial_velocity=velocity[0] + np.cross(omega[0], arms),
         prescribed=PrescribedMotion(
-            pids=tuple(part.pid for part in parts if part.material.is_rigid),
+            pids=tuple(part.pid for part in model.parts if part.role == "skull"),
             times=driver["time_s"].to_numpy(),
             positions=position,
             quaternions=quaternion,

@@ -34,15 +34,22 @@ _TITLES = {
 }
 _WITHOUT_CONTACT = (
     (
-        "Sliding, lift-off and bottoming out of the helmet. There is no contact in this model: pads share nodes with scalp"
-        " and shell, so the helmet stays joined to the head."
+        "Sliding, lift-off and bottoming out of the helmet. There is no contact in this model: pads share nodes with"
+        " scalp and shell, so the helmet stays joined to the head."
     ),
     (
-        "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet, and"
-        " facemask forces, contact work and the action of an impactor are not computed."
+        "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
+        " and facemask forces, contact work and the action of an impactor are not computed."
     ),
     "Damage. The brain is visco-elastic here; the article's damage variable is not computed.",
 )
+_STRUCTURE = {
+    "rigid": (
+        "Deformation of shell and facemask. They move as one rigid body: at this resolution one element across a"
+        " wall or a bar could bend by hourglass modes alone."
+    ),
+    "deformable": "Bending of shell and facemask: one element across is carried by hourglass stiffness.",
+}
 
 
 def run(workspace: Workspace) -> str | None:
@@ -78,7 +85,7 @@ def collect(stage: Stage) -> ReportInput:
         "parts": _parts(stage, model),
         "parameters": _parameters(model),
         "mesh": _mesh(model),
-        "cannot_show": [*_WITHOUT_CONTACT, *quality["warnings"]],
+        "cannot_show": [*_WITHOUT_CONTACT, _STRUCTURE[play.model.helmet_structure], *quality["warnings"]],
         "inputs": inputs["files"],
         "provenance": _provenance(stage, model),
         "mass_scaling_time_step_s": play.solver.mass_scaling_time_step_s,
