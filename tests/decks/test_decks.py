@@ -294,3 +294,14 @@ def test_friction_pairs_can_be_replaced(tmp_path: Path, deck: DeckInput) -> None
     pairs = (FrictionPair(60009020, 10000181, 2, "only_the_cup"),)
     write_velodyne(tmp_path, dataclasses.replace(deck, friction_pairs=pairs))
     assert read_velodyne(tmp_path / "velodyne.card").friction_pairs == pairs
+
+
+def test_rigid_parts_that_share_nodes_are_merged_and_others_are_not(tmp_path: Path, deck: DeckInput) -> None:
+    write_lsdyna(tmp_path / "one", deck)
+    assert read_keyword(tmp_path / "one" / "main.k").merged_bodies == []  # the skull alone
+    rigid = {"law": "rigid", "parameters": ELASTIC}
+    # Cups 6, 7 and shell 8 lie on each other and are one body; the skull (2) touches none of them.
+    parts = (*PARTS[:6], *(dataclasses.replace(part, **rigid) for part in PARTS[6:]))
+    write_lsdyna(tmp_path / "two", dataclasses.replace(deck, parts=parts))
+    back = read_keyword(tmp_path / "two" / "main.k")
+    assert back.merged_bodies == [(PARTS[6].pid, PARTS[7].pid), (PARTS[6].pid, PARTS[8].pid)]

@@ -247,3 +247,22 @@ def test_regions_follow_their_rules(coarse: Model) -> None:
 def test_unknown_names_are_refused(arguments: tuple[str, str], match: str) -> None:
     with pytest.raises(ValueError, match=match):
         build_model(*arguments)
+
+
+def test_shell_and_facemask_are_rigid_unless_asked_for_otherwise(tiny: Model) -> None:
+    for structure, law in (("rigid", "rigid"), ("deformable", "elastic")):
+        model = build_model("nfl", "tiny", helmet_structure=structure)
+        laws = {part.role: model.materials[part.material]["law"] for part in model.parts}
+        assert laws["shell"] == laws["facemask"] == law
+        assert laws["scalp"] == "elastic"
+        np.testing.assert_array_equal(model.nodes, tiny.nodes)
+    with pytest.raises(ValueError, match="no helmet structure 'wooden'"):
+        build_model("nfl", "tiny", helmet_structure="wooden")
+
+
+def test_a_bare_head_is_the_head_of_the_helmeted_one(tiny: Model) -> None:
+    bare = build_model("nfl", "tiny", helmet=False)
+    np.testing.assert_array_equal(bare.nodes, select_assembly(tiny, "head").nodes)
+    assert {part.assembly for part in bare.parts} == {"head"}
+    with pytest.raises(ValueError, match="no element of the assembly 'helmet'"):
+        select_assembly(bare, "helmet")

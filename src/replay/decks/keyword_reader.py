@@ -36,8 +36,9 @@ class KeywordDeck:
         Curve number to points.
     cards
         Keyword to the fields of its first card, for controls and outputs.
-    initial_velocities, prescribed
-        Fields of the cards of *INITIAL_VELOCITY_GENERATION and *BOUNDARY_PRESCRIBED_MOTION_RIGID.
+    initial_velocities, prescribed, merged_bodies
+        Fields of the cards of *INITIAL_VELOCITY_GENERATION, *BOUNDARY_PRESCRIBED_MOTION_RIGID and
+        *CONSTRAINED_RIGID_BODIES.
     """
 
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
@@ -49,6 +50,7 @@ class KeywordDeck:
     cards: dict[str, tuple[float, ...]] = field(default_factory=dict)
     initial_velocities: list[tuple[float, ...]] = field(default_factory=list)
     prescribed: list[tuple[float, ...]] = field(default_factory=list)
+    merged_bodies: list[tuple[int, int]] = field(default_factory=list)
 
 
 def read_keyword(path: str | Path) -> KeywordDeck:
@@ -114,6 +116,9 @@ def _take(path: Path, keyword: str, cards: list[str], deck: KeywordDeck) -> None
         deck.initial_velocities.append((*_columns(cards[0], 10, float), *_columns(cards[1], 10, float)))
     elif keyword == "*BOUNDARY_PRESCRIBED_MOTION_RIGID":
         deck.prescribed.append(tuple(_columns(cards[0], 10, float)))
+    elif keyword == "*CONSTRAINED_RIGID_BODIES":
+        lead, follower = _columns(cards[0], 10, int)
+        deck.merged_bodies.append((lead, follower))
     elif keyword == "*INCLUDE":
         _read_into(path.parent / cards[0].strip(), deck)
     elif keyword not in ("*KEYWORD", "*TITLE", "*END", "*SECTION_SOLID"):

@@ -115,6 +115,8 @@ def main_text(deck: DeckInput, includes: Sequence[str]) -> str:
             _card(*p, *direction, 0),
         ]
     lines += _driver_lines(deck)
+    for lead, follower in tied_rigid_parts(deck):
+        lines += ["*CONSTRAINED_RIGID_BODIES", "$ rigid parts that share nodes are one body", _card(lead, follower)]
     for include in includes:
         lines += ["*INCLUDE", include]
     return "\n".join([*lines, "*END"]) + "\n"
@@ -150,6 +152,22 @@ def mesh_text(deck: DeckInput, assembly: str) -> str:
         lines += ["*SECTION_SOLID", "$ elform 1: one integration point", _card(part.pid, 1)]
         lines += _material_lines(part)
     return "\n".join([*lines, "*END"]) + "\n"
+
+
+def tied_rigid_parts(deck: DeckInput) -> list[tuple[int, int]]:
+    """Pairs of part numbers (lead, follower) of rigid parts that share nodes and therefore are one body.
+
+    Every follower is named once, and a lead follows nobody.
+    """
+    rigid = [k for k, part in enumerate(deck.parts) if part.law == "rigid"]
+    nodes = {k: np.unique(deck.hexes[deck.element_part == k]) for k in rigid}
+    lead = {k: k for k in rigid}
+    for position, k in enumerate(rigid):
+        for other in rigid[:position]:
+            if lead[k] != lead[other] and len(np.intersect1d(nodes[k], nodes[other])):
+                old, new = sorted((lead[k], lead[other]), reverse=True)
+                lead = {a: new if b == old else b for a, b in lead.items()}
+    return [(deck.parts[lead[k]].pid, deck.parts[k].pid) for k in rigid if lead[k] != k]
 
 
 def one_decay(shear_pa: float, ratios: Sequence[float], times_s: Sequence[float]) -> tuple[float, float, float]:
