@@ -1,0 +1,77 @@
+"""Stage ``decks``: the same replay for other solvers, as the article's card and as LS-DYNA keyword."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from replay import decks
+from replay.models import Model, read_model
+from replay.motion import DRIVER
+from replay.play import Play
+from replay.stages.frame import Stage, Workspace
+from replay.stages.settings import read_settings
+
+# Numbers of the two stabilisations in the article's solver; its protocol uses 4.
+_HOURGLASS_METHODS = {"stiffness": 4, "viscous": 1}
+_EVERYTHING = "all_parts"
+
+
+def run(workspace: Workspace) -> str | None:
+    """Write both decks with the model posed at the start of the window."""
+    stage = Stage(workspace, "decks", after=["settings", "assembly", "driver"])
+    if stage.stopped_by:
+        return stage.skip()
+    play = read_settings(stage)
+    model = read_model(stage.read("assembly", "model.h5"))
+    driver = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
+    deck = deck_input(play, model, driver)
+    folder = stage.folder_for_many()
+    for solver, write in (("velodyne", decks.write_velodyne), ("lsdyna", decks.write_lsdyna)):
+        for path in write(folder / solver, deck):
+            stage.write(path.relative_to(folder).as_posix(), f"run deck for {solver}")
+    return stage.finish()
+
+
+def deck_input(play: Play, model: Model, driver: pd.DataFrame) -> decks.DeckInput:
+    """What both writers need: the solver's own problem, in their terms."""
+    position = driver[["x_m", "y_m", "z_m"]].to_numpy()
+    velocity = driver[[f"v{axis}_m_per_s" for axis in "xyz"]].to_numpy()
+    omega = driver[[f"omega_{axis}_rad_per_s" for axis in "xyz"]].to_numpy()
+    start = Rotation.from_quat(driver[["qx", "qy", "qz", "qw"]].to_numpy()[0])
+    speed, p, q = decks.axis_through(position[0], omega[0])
+    settings = play.solver
+    return decks.DeckInput(
+        title=f"{play.name}: {play.title}" if play.title else play.name,
+        nodes=position[0] + start.apply(model.nodes),
+        node_ids=model.node_ids,
+        hexes=model.hexes,
+        element_ids=model.element_ids,
+        element_part=model.element_part,
+        parts=decks.deck_parts(model.parts, model.materials),
+        part_sets=tuple(decks.PartSet(model.part_set_ids[name], name, pids) for name, pids in model.part_sets.items()),
+        controls=decks.DeckControls(
+            termination_time_s=play.window.duration_s,
+            time_step_factor=settings.time_step_factor,
+            plot_interval_s=settings.plot_interval_s,
+            history_interval_s=settings.history_interval_s,
+            hourglass_method=_HOURGLASS_METHODS[settings.hourglass.method],
+            hourglass_coefficient=settings.hourglass.coefficient,
+            bulk_viscosity_quadratic=settings.bulk_viscosity.quadratic,
+            bulk_viscosity_linear=settings.bulk_viscosity.linear,
+            mass_scaling_time_step_s=settings.mass_scaling_time_step_s,
+        ),
+        initial_velocities=(decks.InitialVelocity(model.part_set_ids[_EVERYTHING], _triple(velocity[0]), speed, p, q),),
+        driver=decks.Driver(
+            pid=next(part.pid for part in model.parts if part.role == "skull"),
+            time_s=driver["time_s"].to_numpy(),
+            velocity_m_per_s=velocity,
+            omega_rad_per_s=omega,
+        ),
+        notes=tuple(model.info["notes"]),
+    )
+
+
+def _triple(vector: np.ndarray) -> tuple[float, float, float]:
+    return float(vector[0]), float(vector[1]), float(vector[2])
