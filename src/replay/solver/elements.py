@@ -84,12 +84,16 @@ class ElementGroup:
         self._control = numerical_control(problem.controls)
         self._kernel = law_kernel(group.law)
 
-    def forces(self, nodal: NDArray[np.float64], dt: float) -> None:
-        """Bring the elements to the end of a step of length `dt` [s] and write their nodal forces."""
-        self._kernel(
+    def kernel_arguments(self, nodal: NDArray[np.float64], dt: float) -> tuple[Any, ...]:
+        """Arguments of `kernels.lanes.law_forces` for these elements."""
+        return (
             nodal, self._connectivity, self.group.fill, self._row, self.mass, self._reference, self.stress,
             self.hourglass, self.state, self._parameters, self._control, dt, self.force, self.step, self.work,
         )  # fmt: skip
+
+    def forces(self, nodal: NDArray[np.float64], dt: float) -> None:
+        """Bring the elements to the end of a step of length `dt` [s] and write their nodal forces."""
+        self._kernel(*self.kernel_arguments(nodal, dt))
 
     def scatter(self, values: NDArray[np.float64], into: NDArray[np.float64]) -> None:
         """Write values of this group, (n_blocks, k, LANES) or (n_blocks, LANES), to the user's element rows."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InputError
 from replay.solver.kernels.geometry import element_gradients
-from replay.solver.materials import Material, law_parameters
+from replay.solver.materials import LAWS, Material, law_parameters
 
 WHERE = "solver problem"
 
@@ -216,7 +216,7 @@ class Problem:
     nodal_forces : (n, 3) float64, optional
         Loads from time 0 on [N].
     initial_stress : (m, 6) float64, optional
-        Cauchy stress xx, yy, zz, xy, yz, zx at time 0 [Pa]; only for laws in rate form.
+        Cauchy stress xx, yy, zz, xy, yz, zx at time 0 [Pa]; only for laws that say ``INITIAL_STRESS``.
 
     Raises
     ------
@@ -310,9 +310,13 @@ class Problem:
         self._check_motion()
 
     def _check_motion(self) -> None:
-        rigid = np.array([part.material.is_rigid for part in self.parts])
-        if (self.initial_stress[rigid[self.element_part]] != 0).any():
-            raise InputError(WHERE, "a rigid part has an initial stress", column="initial_stress")
+        stressed = {self.parts[k].pid for k in self.element_part[(self.initial_stress != 0).any(axis=1)].tolist()}
+        for part in self.parts:
+            if part.pid in stressed and not LAWS[part.material.law].INITIAL_STRESS:
+                raise InputError(
+                    WHERE, f"part {part.name!r} of the law {part.material.law!r} has an initial stress",
+                    column="initial_stress", expected="only laws whose stress is not a function of the deformation",
+                )  # fmt: skip
         if self.prescribed is None:
             return
         known = {part.pid: part for part in self.parts}

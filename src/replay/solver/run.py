@@ -129,6 +129,7 @@ class _Run:
         self.histories = Histories(problem)
         self.checkpoints = Checkpoints(folder / "checkpoint", identity(problem))
         self.smallest = np.array([math.inf, math.inf])  # time step, volume ratio
+        self._last_state_s = -1.0
         self._soft = np.array([not p.material.is_rigid for p in problem.parts])[problem.element_part]
         saved = self.checkpoints.read() if resume else None
         if saved is None:
@@ -137,7 +138,7 @@ class _Run:
             self._restore(saved)
         written = None if saved is None else int(saved["counts"][2])
         self.states = States(problem, folder, self.reference.volume, resume_at=written)
-        self._good: dict[str, NDArray[np.float64]] = {}
+        self._good = {name: a.copy() for name, a in self.integrator.arrays().items()}
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         result: dict[str, NDArray[Any]] = {f"run.{k}": v for k, v in self.integrator.arrays().items()}
@@ -146,6 +147,7 @@ class _Run:
             result |= {f"recorder{number}.{k}": np.asarray(v) for k, v in recorder.state().items()}
         result["counts"] = np.array([*self.clock.count, self.states.count], np.int64)
         result["smallest"] = self.smallest
+        result["last_state_s"] = np.array([self._last_state_s])
         return result
 
     def _restore(self, saved: dict[str, NDArray[Any]]) -> None:
@@ -158,6 +160,7 @@ class _Run:
             recorder.restore(below(f"recorder{number}."))
         self.clock.count = saved["counts"][:2].tolist()
         self.smallest = saved["smallest"].copy()
+        self._last_state_s = float(saved["last_state_s"][0])
         self.progress.note(f"goes on from {self.integrator.time_s:.6g} s, step {self.integrator.step}")
 
     def save(self) -> Path:
@@ -212,17 +215,17 @@ class _Run:
     def _sample(self, bound: StepBound, velocities: NDArray[np.float64], state: bool) -> None:
         integrator = self.integrator
         view = StateView(integrator, velocities, self.reference)
+        self._good = {name: a.copy() for name, a in integrator.arrays().items()}
         self.histories.sample(view, bound, integrator.added_mass.total_kg)
         for recorder in self.recorders:
             recorder.sample(view)
         if state:
             self.states.append(view)
+            self._last_state_s = view.time_s
         if self._soft.any():
             ratio = (view.volumes / self.reference.volume)[self._soft].min()
             step = view.time_step_s if view.step else math.inf
             self.smallest = np.minimum(self.smallest, [step, ratio])
-        self._good = {name: a.copy() for name, a in integrator.arrays().items()}
-        self._good_view = view
 
     def finish(self, stopped: str = "") -> RunSummary:
         """Write all tables and the summary."""
@@ -258,21 +261,12 @@ class _Run:
         return summary
 
     def stop(self, error: InstabilityError) -> None:
-        """Leave the last good state where the user can look at it, then the tables as far as they go."""
-        if self._good:
-            self.integrator.restore(self._good)
-            if self.states.count == 0 or self.clock.count[1] * self.controls.plot_interval_s > self._good_view.time_s:
-                self._append_once()
-            self.finish(str(error))
-        else:
-            self.states.abandon()
-
-    def _append_once(self) -> None:
-        if self._good_view.time_s > self._last_state_time():
-            self.states.append(self._good_view)
-
-    def _last_state_time(self) -> float:
-        return (self.clock.count[1] - 1) * self.controls.plot_interval_s if self.states.count else -1.0
+        """Leave the last good state where the user can look at it, and the tables as far as they go."""
+        self.integrator.restore(self._good)
+        view = StateView(self.integrator, self.integrator.velocities(), self.reference)
+        if view.time_s > self._last_state_s:
+            self.states.append(view)
+        self.finish(str(error))
 
 
 def state_hash(integrator: Integrator) -> str:

@@ -91,7 +91,7 @@ def scale_masses(problem: Problem, groups: Sequence[ElementGroup], nodal: NDArra
     few rounds bring it to the target.
     """
     target = problem.controls.mass_scaling_time_step_s / problem.controls.time_step_factor
-    for _ in range(_MASS_ROUNDS):
+    for _ in range(_MASS_ROUNDS if target > 0 else 0):
         short = False
         for group in groups:
             group.forces(nodal, 0.0)

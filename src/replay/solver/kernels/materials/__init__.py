@@ -11,6 +11,10 @@ A law is a module with
     Names of the state variables kept per element besides the stress; all start at zero.
 ``TOTAL_FORM``
     Whether the law looks at the deformation gradient.
+``INITIAL_STRESS``
+    Whether a run may begin with a stress, that is, whether the stress is a state of its own.
+``N_CONSTANTS``
+    How many numbers ``constants()`` gives.
 ``update(motion, stress, state, dt, p)``
     Scalar, branch-free; returns stress, state and `Moduli`.
 

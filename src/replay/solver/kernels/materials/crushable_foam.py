@@ -45,6 +45,7 @@ from replay.solver.kernels.tensors import (
 
 NAME = "crushable_foam"
 STATE: tuple[str, ...] = ("largest_energy", "closing_rate")
+INITIAL_STRESS = False
 TOTAL_FORM = True
 #: Ramps that make up the curve.
 KNOTS = 12

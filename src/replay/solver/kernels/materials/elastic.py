@@ -10,6 +10,7 @@ from replay.solver.kernels.tensors import add_scaled_sym, add_trace, congruence,
 
 NAME = "elastic"
 STATE: tuple[str, ...] = ()
+INITIAL_STRESS = True
 TOTAL_FORM = False
 N_CONSTANTS = 2
 

@@ -15,6 +15,7 @@ from replay.solver.kernels.tensors import add_scaled_sym, add_trace, congruence,
 
 NAME = "fluid"
 STATE: tuple[str, ...] = ()
+INITIAL_STRESS = False
 TOTAL_FORM = False
 N_CONSTANTS = 2
 

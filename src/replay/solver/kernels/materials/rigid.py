@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 NAME = "rigid"
+INITIAL_STRESS = False
 
 
 @dataclass(frozen=True)

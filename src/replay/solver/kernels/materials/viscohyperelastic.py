@@ -32,6 +32,7 @@ from replay.solver.kernels.tensors import (
 NAME = "viscohyperelastic"
 _TENSORS = ("elastic", "viscous_1", "viscous_2")
 STATE: tuple[str, ...] = tuple(f"{name}_{k}" for name in _TENSORS for k in ("xx", "yy", "zz", "xy", "yz", "zx"))
+INITIAL_STRESS = False
 TOTAL_FORM = True
 N_CONSTANTS = 6
 _TERMS = 2

@@ -1,0 +1,161 @@
+"""The element against a textbook version of itself, and what a linear field must do to it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import dumb
+import numba
+import numpy as np
+import pytest
+
+from replay.solver import Controls, Material, Problem, SolverPart
+from replay.solver.elements import ElementGroup, law_kernel
+from replay.solver.integrator import Integrator
+from replay.solver.kernels import tensors
+from replay.solver.kernels.hexahedron import largest_frequency
+from replay.solver.kernels.lanes import LANES
+
+CUBE = 0.5 * (1 + dumb.SIGNS)
+
+
+def crooked(seed: int, n: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    nodes = (CUBE + 0.2 * rng.uniform(-1, 1, (n, 8, 3))).reshape(-1, 3)
+    return nodes, np.arange(8 * n).reshape(n, 8)
+
+
+def problem(nodes: np.ndarray, hexes: np.ndarray, material: Material, **fields: Any) -> Problem:
+    controls = fields.pop("controls", Controls(1.0, mass_scaling_time_step_s=0.0))
+    return Problem(nodes, hexes, np.zeros(len(hexes), int), (SolverPart(1, "p", material),), controls, **fields)
+
+
+def per_element(group: ElementGroup, values: np.ndarray, count: int) -> np.ndarray:
+    result = np.zeros((count, values.shape[1]))
+    group.scatter(values, result)
+    return result
+
+
+def test_fast_element_agrees_with_the_textbook() -> None:
+    nodes, hexes = crooked(1)
+    rng = np.random.default_rng(2)
+    material = Material("m", "elastic", 900.0, {"youngs_modulus_pa": 3e5, "poisson_ratio": 0.35})
+    lame, shear = 3e5 * 0.35 / (1.35 * 0.3), 3e5 / 2.7
+    stress = rng.normal(size=(len(hexes), 6)) * 1e3
+    run = Integrator(problem(nodes, hexes, material, initial_stress=stress), 1e9)
+    group = run.groups[0]
+    group.hourglass[:] = rng.normal(size=group.hourglass.shape) * 30
+    hourglass = per_element(group, group.hourglass, len(hexes))
+    velocity = rng.normal(size=nodes.shape) * 2
+    dt = 0.02
+    order = run.layout.node_order
+    run.nodal[:, 4:7] = velocity[order]
+    group.forces(run.nodal, dt)
+    forces = per_element(group, group.force, len(hexes)).reshape(-1, 3, 8).transpose(0, 2, 1)
+    new_stress = per_element(group, group.stress, len(hexes))
+    new_hourglass = per_element(group, group.hourglass, len(hexes))
+    for e in range(len(hexes)):
+        x, v = nodes[hexes[e]], velocity[hexes[e]]
+        volume = dumb.mean_b(x)[1]
+        f, s, q = dumb.elastic_step(
+            x, v, dumb.symmetric(stress[e]), hourglass[e].reshape(4, 3), dt, 900.0 * volume, lame, shear, 0.1, 0.06, 1.2
+        )
+        assert np.abs(dumb.symmetric(new_stress[e]) - s).max() < 1e-11 * np.abs(s).max()
+        assert np.abs(new_hourglass[e].reshape(4, 3) - q).max() < 1e-11 * np.abs(q).max()
+        assert np.abs(forces[e] - f).max() < 1e-11 * np.abs(f).max()
+
+
+def test_forces_of_an_element_are_in_balance() -> None:
+    nodes, hexes = crooked(3)
+    rng = np.random.default_rng(4)
+    stress = rng.normal(size=(len(hexes), 6))
+    material = Material("m", "elastic", 1.0, {"youngs_modulus_pa": 10.0, "poisson_ratio": 0.2})
+    run = Integrator(problem(nodes, hexes, material, initial_stress=stress), 1e9)
+    group = run.groups[0]
+    group.hourglass[:] = rng.normal(size=group.hourglass.shape)
+    group.forces(run.nodal, 0.0)
+    f = per_element(group, group.force, len(hexes)).reshape(-1, 3, 8).transpose(0, 2, 1)
+    assert np.abs(f.sum(axis=1)).max() < 1e-13
+    assert np.abs(np.cross(nodes[hexes], f).sum(axis=1)).max() < 1e-13
+
+
+def exact_frequency(x: np.ndarray, lame: float, shear: float, mass: float) -> float:
+    b, volume = dumb.mean_b(x)
+    strain = np.zeros((6, 24))
+    for node in range(8):
+        bx, by, bz = b[node]
+        strain[:, 3 * node : 3 * node + 3] = [
+            [bx, 0, 0], [0, by, 0], [0, 0, bz], [by, bx, 0], [0, bz, by], [bz, 0, bx]
+        ]  # fmt: skip
+    moduli = np.diag([2 * shear] * 3 + [shear] * 3)
+    moduli[:3, :3] += lame
+    return float(np.sqrt(np.linalg.eigvalsh(strain.T @ moduli @ strain / volume)[-1] * 8 / mass))
+
+
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49999])
+def test_time_step_bound_is_safe_for_any_shape_and_sharp_for_a_cube(poisson: float) -> None:
+    lame, shear = poisson / ((1 + poisson) * (1 - 2 * poisson)), 0.5 / (1 + poisson)
+
+    def bound(x: np.ndarray, mass: float) -> float:
+        b, volume = dumb.mean_b(x)
+        a = b.T @ b
+        six = (a[0, 0], a[1, 1], a[2, 2], a[0, 1], a[1, 2], a[2, 0])
+        norms = (float(np.trace(a)), tensors.largest_eigenvalue_bound(six))
+        return largest_frequency(lame, shear, 0.0, norms, volume, mass)
+
+    assert bound(CUBE, 2.0) == pytest.approx(exact_frequency(CUBE, lame, shear, 2.0), rel=1e-12)
+    nodes, hexes = crooked(5, 60)
+    stretched = nodes * np.array([1.0, 0.3, 4.0])
+    for e in hexes:
+        for x in (nodes[e], stretched[e]):
+            ratio = bound(x, 1.0) / exact_frequency(x, lame, shear, 1.0)
+            assert 1.0 - 1e-12 <= ratio < 1.3
+
+
+def test_a_prestressed_hex_spun_about_a_diagonal_keeps_its_stress_and_hourglass_forces() -> None:
+    nodes, hexes = crooked(6, 1)
+    rng = np.random.default_rng(7)
+    stress = rng.normal(size=(1, 6)) * 1e3
+    material = Material("m", "elastic", 1000.0, {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3})
+    run = Integrator(problem(nodes, hexes, material, initial_stress=stress), 1e9)
+    group = run.groups[0]
+    group.hourglass[:] = rng.normal(size=group.hourglass.shape)
+    start = per_element(group, group.hourglass, 1).reshape(4, 3)
+    axis = np.ones(3) / np.sqrt(3)
+    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    first = run.nodal[:, :3].copy()
+    work = 0.0
+    for k in range(1, 1001):
+        angle = 0.05 * k
+        turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        place = first @ turn.T
+        run.nodal[:, 4:7] = (place - run.nodal[:, :3]) / 1e-3
+        run.nodal[:, :3] = place
+        group.forces(run.nodal, 1e-3)
+        work += abs(group.work).sum()
+    now = dumb.symmetric(per_element(group, group.stress, 1)[0])
+    scale = np.abs(stress).max()
+    assert np.abs(now - turn @ dumb.symmetric(stress[0]) @ turn.T).max() < 1e-10 * scale
+    hourglass = per_element(group, group.hourglass, 1).reshape(4, 3)
+    assert np.abs(hourglass - start @ turn.T).max() < 1e-10 * np.abs(start).max()
+    assert work < 1e-10 * scale
+
+
+def test_packed_instructions_dominate_the_lane_loop() -> None:
+    nodes, hexes = crooked(8, LANES)
+    material = Material("m", "elastic", 1e3, {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3})
+    group = Integrator(problem(nodes, hexes, material), 1e9).groups[0]
+    arguments = group.kernel_arguments(np.zeros((len(nodes), 8)), 0.0)
+    nodal, connectivity, _, _, mass, reference, stress, hourglass, state, parameters, control, dt = arguments[:12]
+    block = law_kernel("elastic").py_func.__globals__["run_block"]
+    whole = (
+        0, 1, nodal, connectivity, mass, reference, stress, hourglass, state, parameters, 0, control, dt,
+        *arguments[12:],
+    )  # fmt: skip
+    block.compile(tuple(numba.typeof(a) for a in whole))
+    text = next(iter(block.inspect_asm().values()))
+    arithmetic = r"\bv?(?:add|sub|mul|div|sqrt|max|min)"
+    packed = len(re.findall(arithmetic + r"pd\b", text))
+    scalar = len(re.findall(arithmetic + r"sd\b", text))
+    assert packed > 10 * scalar, f"{packed} packed, {scalar} scalar"
