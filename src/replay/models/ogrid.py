@@ -37,7 +37,7 @@ class Resolution:
 
 
 RESOLUTIONS = {
-    "tiny": Resolution(6, brain=2, csf=1, skull=1, scalp=1, comfort=1, energy=1, facemask_step_m=0.020),
+    "tiny": Resolution(6, brain=2, csf=1, skull=1, scalp=1, comfort=1, energy=2, facemask_step_m=0.020),
     "coarse": Resolution(10, brain=4, csf=1, skull=1, scalp=2, comfort=1, energy=2, facemask_step_m=0.013),
 }
 
