@@ -103,7 +103,16 @@ class Gate:
     def causes(self) -> tuple[Check, ...]:
         """Return the checks that gave the verdict, worst first; none for a pass."""
         bad = [check for check in self.checks if check.verdict != "pass"]
-        return tuple(sorted(bad, key=lambda check: -_RANK[check.verdict]))
+        return tuple(sorted(bad, key=lambda check: (-_RANK[check.verdict], check.verdict == "vacuous")))
+
+    def cause_lines(self) -> list[str]:
+        """Return the causes for a terminal: one line a check, and one line a reason for those without power."""
+        lines = [f"{check.verdict}: {check.sentence()}" for check in self.causes() if check.verdict != "vacuous"]
+        powerless: dict[str, list[str]] = {}
+        for check in self.causes():
+            if check.verdict == "vacuous":
+                powerless.setdefault(check.detail or "no reason given", []).append(check.name)
+        return lines + [f"not checked ({why}): {', '.join(names)}" for why, names in powerless.items()]
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of gate.json."""

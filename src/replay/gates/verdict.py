@@ -9,6 +9,7 @@ from typing import Any, Literal
 from replay.gates.limits import Limits
 from replay.gates.model import Check, Gate
 
+_WORST_FIRST = ("fail", "warn", "vacuous", "pass")
 Status = Literal["accepted", "accepted with warnings", "rejected"]
 
 
@@ -101,7 +102,7 @@ def play_verdict(
     missing = tuple(name for name in limits.gates if name not in given and name not in awaited)
     worst = {gate.verdict for gate in ordered}
     causes = [(gate, check) for gate in ordered for check in gate.causes()]
-    causes.sort(key=lambda cause: cause[1].verdict != "fail")
+    causes.sort(key=lambda cause: _WORST_FIRST.index(cause[1].verdict))
     status: Status = "accepted"
     if "fail" in worst or missing:
         status = "rejected"

@@ -201,6 +201,7 @@ def _calibrated(
         material = dict(library[part.material])
         material["density_nominal_kg_per_m3"] = float(nominal[k])
         material["density_kg_per_m3"] = float(nominal[k] * factor[k])
+        material["certainty"] = {**material["certainty"], "density_kg_per_m3": "calibrated"}
         materials.setdefault(part.material, material)
     calibration = {
         part.name: {

@@ -83,7 +83,7 @@ def initial_conditions_table(rows: Sequence[Row]) -> str:
     if not rows:
         return absent("Table 3 is empty: no initial conditions were derived.")
     return table(
-        "Table 3. Initial conditions at t₀, from the reconstruction and as applied",
+        "Table 3. Initial conditions at the start of the window, from the reconstruction and as applied",
         ["Item", "Real play (reconstruction)", "Applied to the model"],
         [
             [
@@ -94,7 +94,7 @@ def initial_conditions_table(rows: Sequence[Row]) -> str:
             for row in rows
         ],
         numeric=(1, 2),
-        note="Global frame, z up. The driven skull follows its whole history; these are its values at t₀.",
+        note="Global frame, z up. The driven skull follows its whole history; these are its first values.",
     )
 
 

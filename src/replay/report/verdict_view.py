@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from replay.report.markup import badge, label, limit, number, table, text, unit
 from replay.report.model import ReportInput, Row
 
@@ -15,9 +17,11 @@ def banner(report: ReportInput) -> str:
     status = str(verdict["status"])
     worst = "fail" if status == "rejected" else "warn"
     causes = [c for c in verdict.get("causes", ()) if worst == "warn" or c["verdict"] == "fail"]
-    lines = [f"<li>{gate_title(report, c['gate'])}: {_cause(report, c)}</li>" for c in causes[:_MOST_CAUSES]]
-    if len(causes) > _MOST_CAUSES:
-        lines.append(f'<li>and {len(causes) - _MOST_CAUSES} more, <a href="#gates">in the gates below</a></li>')
+    judged = [c for c in causes if c["verdict"] != "vacuous"]
+    lines = [f"<li>{gate_title(report, c['gate'])}: {_cause(report, c)}</li>" for c in judged[:_MOST_CAUSES]]
+    if len(judged) > _MOST_CAUSES:
+        lines.append(f'<li>and {len(judged) - _MOST_CAUSES} more, <a href="#gates">in the gates below</a></li>')
+    lines += [f"<li>not checked, {text(why)}: {what}</li>" for why, what in _powerless(report, causes)]
     if not causes and verdict.get("not_evaluated"):
         missing = ", ".join(gate_title(report, name) for name in verdict["not_evaluated"])
         lines.append(f"<li>not evaluated: {missing}</li>")
@@ -55,6 +59,17 @@ def _cause(report: ReportInput, cause: Row) -> str:
     if check["value"] is not None:
         words += f" {_with_unit(number(check['value']), check['unit'])}, limit {limit(check['limit'])}"
     return words + (f" ({text(check['detail'])})" if check.get("detail") else "")
+
+
+def _powerless(report: ReportInput, causes: Sequence[Row]) -> list[tuple[str, str]]:
+    """Checks without power, gathered by their reason, with their gates."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for cause in causes:
+        check = _find(report, cause["gate"], cause["check"])
+        if cause["verdict"] == "vacuous" and check is not None:
+            gates = found.setdefault(str(check.get("detail") or "no reason given"), {})
+            gates.setdefault(gate_title(report, cause["gate"]), []).append(label(check["name"], check["unit"]))
+    return [(why, "; ".join(f"{g}: {', '.join(names)}" for g, names in gates.items())) for why, gates in found.items()]
 
 
 def _find(report: ReportInput, gate_name: str, check_name: str) -> Row | None:

@@ -195,8 +195,8 @@ class Stage:
         refusal: str | None = None
         for gate in gates:
             print(f"gate {gate.name}: {gate.verdict}")
-            for check in gate.causes():
-                print(f"    {check.verdict}: {check.sentence()}")
+            for line in gate.cause_lines():
+                print(f"    {line}")
             if gate.stops and refusal is None:
                 worst = next(check for check in gate.causes() if check.verdict == "fail")
                 refusal = f"stopped by gate {gate.name}: {worst.sentence()}"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -110,7 +109,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "fidelity": read_json(stage.read("fidelity", "fidelity.json")),
         "initial_conditions": _initial_conditions(stage, applied),
         "energy": _table(stage, "replay", "energy.csv"),
-        "timestep": _table(stage, "replay", "timestep.csv"),
+        "timestep": _table(stage, "replay", "timestep.csv").query("step > 0"),
         "part_energy": energy.assign(fluid=energy["pid"].isin(fluid)),
         "head_measures": measures["head"],
         "brain_histories": _table(stage, "replay", "brain_histories.csv"),
@@ -240,29 +239,27 @@ def _parts(stage: Stage, model: Model) -> list[dict[str, Any]]:
     return rows
 
 
+# Suffix of a parameter's name, and its unit as printed.
+_UNITS = {"_pa": "Pa", "_kg_per_m3": "kg/m^3", "_times_s": "s", "_per_s": "1/s", "_s": "s"}
+
+
 def _parameters(model: Model) -> list[dict[str, Any]]:
     rows = []
     for name, facts in model.materials.items():
-        values = {"density_kg_per_m3": facts["density_kg_per_m3"], **facts["parameters"]}
-        for parameter, value in values.items():
-            if _is_curve(value):
-                continue
-            certainty = facts["certainty"]
+        certainty = facts["certainty"]
+        for parameter, value in {"density_kg_per_m3": facts["density_kg_per_m3"], **facts["parameters"]}.items():
+            suffix = next((ending for ending in _UNITS if parameter.endswith(ending)), "")
             rows.append(
                 {
                     "material": name,
-                    "parameter": parameter,
-                    "value": value,
-                    "unit": "",
-                    "certainty": certainty.get(parameter, "") if isinstance(certainty, dict) else certainty,
+                    "parameter": parameter.removesuffix(suffix),
+                    "value": ", ".join(f"{v:g}" for v in value) if isinstance(value, list | tuple) else value,
+                    "unit": _UNITS.get(suffix, ""),
+                    "certainty": certainty.get(parameter, "assumed") if isinstance(certainty, dict) else certainty,
                     "source": facts["source"],
                 }
             )
     return rows
-
-
-def _is_curve(value: Any) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str)
 
 
 def _mesh(model: Model) -> MeshView:

@@ -42,8 +42,8 @@ def show_verdict(results: Path) -> int:
         gate = found.get(name)
         word = gate.verdict if gate else "not reached"
         print(f"  {_coloured(word):<20} {facts.title} [{name}]")
-        for check in gate.causes() if gate else ():
-            print(f"      {check.verdict:<8} {check.sentence()}")
+        for line in gate.cause_lines() if gate else ():
+            print(f"      {line}")
     for entry in verdict["loosened"]:
         print(f"  LOOSENED {entry['gate']}.{entry['check']}: {entry['limit']} instead of {entry['instead_of']}")
     page, archive = results / "report" / "report.html", results / "bundle" / f"{results.name}.zip"
