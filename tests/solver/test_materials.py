@@ -148,10 +148,10 @@ def test_prony_relaxation_is_the_closed_form() -> None:
 
 
 def test_prony_ramp_converges_with_the_second_order() -> None:
-    mu, g, tau, rate, end = 6e3, 0.5, 0.01, 2.0, 0.02
+    mu, g, tau, rate, end = 6e3, 0.5, 0.01, 2e-4, 0.02
     exact = mu * rate * ((1 - g) * end + g * tau * (1 - math.exp(-end / tau)))
     errors = []
-    for n in (32, 64, 128):
+    for n in (8, 16, 32):
         point = Point("viscohyperelastic", bulk_modulus_pa=2e6, shear_modulus_pa=mu, prony_ratios=g, prony_times_s=tau)
         for k in range(1, n + 1):
             f = np.eye(3)

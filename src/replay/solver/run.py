@@ -25,15 +25,13 @@ from replay.solver.integrator import Integrator
 from replay.solver.outputs import Histories, States
 from replay.solver.problem import Controls, Problem
 from replay.solver.progress import Progress
+from replay.solver.threads import ThreadChoice
 from replay.solver.time_step import StepBound, fitted_step
 from replay.solver.view import Recorder, ReferenceGradients, StateView
 from replay.solver.watchdog import check_speed, check_step, speed_limit
 
 #: Steps a history interval is cut into where nothing deforms and no element bounds the step.
 _RIGID_STEPS = 20
-
-#: Fewer blocks of elements are not worth another thread.
-_BLOCKS_PER_THREAD = 32
 
 
 @dataclass(frozen=True)
@@ -173,7 +171,7 @@ class _Run:
             return self.controls.time_step_factor * bound.step_s
         return self.controls.history_interval_s / _RIGID_STEPS
 
-    def go(self, signals: Signals) -> None:
+    def go(self, signals: Signals, threads: ThreadChoice) -> None:
         """Step until the end, a signal, or the watch-dog's veto."""
         integrator, clock = self.integrator, self.clock
         last_save = time.monotonic()
@@ -200,6 +198,7 @@ class _Run:
             if over:
                 return
             integrator.drift(dt, target if lands else t + dt)
+            threads.step()
             self.progress.step(integrator, bound)
             received = signals.take()
             period = self.controls.checkpoint_period_s
@@ -298,7 +297,8 @@ def solve(
     recorders
         See `Recorder`; called at every history time.
     threads
-        Threads of the element and node loops; results do not depend on it. All by default.
+        Most threads of the element and node loops, all by default. The run takes one where more do not
+        pay; results do not depend on it.
     resume
         Whether to go on from a checkpoint in `folder`.
     progress
@@ -324,11 +324,9 @@ def solve(
     try:
         with Signals() as signals:
             run = _Run(problem, folder, recorders, resume, progress)
-            # a thread that waits longer than it works is a loss; the result does not depend on it
-            worthwhile = max(run.integrator.layout.n_blocks // _BLOCKS_PER_THREAD, 1)
-            numba.set_num_threads(min(threads or before, before, worthwhile))
+            choice = ThreadChoice(min(threads or before, before), run.integrator.layout.n_blocks)
             try:
-                run.go(signals)
+                run.go(signals, choice)
             except InstabilityError as error:
                 run.stop(error)
                 raise
