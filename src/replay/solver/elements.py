@@ -40,7 +40,7 @@ class ElementGroup:
     ----------
     problem, layout, group
         What to build.
-    buffer : (n_blocks_of_all, 24, LANES) float64
+    buffer : (n_blocks_of_all, 8, LANES, 3) float64
         Nodal forces; this group writes its own blocks.
 
     Attributes

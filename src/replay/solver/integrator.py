@@ -50,8 +50,8 @@ class Integrator:
         self.nodal = _aligned(n)
         self.nodal[:, POSITION : POSITION + 3] = problem.nodes[order]
         self.nodal[:, VELOCITY : VELOCITY + 3] = problem.initial_velocity[order]
-        self._buffer = np.zeros((max(self.layout.n_blocks, 1), 24, LANES))
-        self._flat = self._buffer.reshape(-1)
+        self._buffer = np.zeros((max(self.layout.n_blocks, 1), 8, LANES, 3))
+        self._flat = self._buffer.reshape(-1, 3)
         self.groups = [ElementGroup(problem, self.layout, g, self._buffer) for g in self.layout.groups]
         self.added_mass: AddedMass = scale_masses(problem, self.groups, self.nodal)
         self._lump()

@@ -67,8 +67,8 @@ class Layout:
         Part indices of each rigid body; the driven body, if any, is the first.
     body_begin, body_end : (n_bodies,) int64
         Tied nodes of each body, counted from `n_free`.
-    first_slot, slot : int64
-        Compressed rows from a solver node to its places in the force buffer (x component).
+    first_slot, slot : uint32
+        Compressed rows from a solver node to its places in the force buffer.
     """
 
     node_order: NDArray[np.int64]
@@ -78,8 +78,8 @@ class Layout:
     body_parts: tuple[tuple[int, ...], ...]
     body_begin: NDArray[np.int64]
     body_end: NDArray[np.int64]
-    first_slot: NDArray[np.int64]
-    slot: NDArray[np.int64]
+    first_slot: NDArray[np.uint32]
+    slot: NDArray[np.uint32]
 
     @property
     def n_blocks(self) -> int:
@@ -187,15 +187,15 @@ def _groups(problem: Problem) -> tuple[BlockGroup, ...]:
 
 def _slots(
     problem: Problem, groups: tuple[BlockGroup, ...], node_row: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
     nodes, slots = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
     for group in groups:
         block, lane = np.nonzero(group.filled)
         corner = np.arange(8)
         nodes.append(node_row[problem.hexes[group.rows[block, lane]]].ravel())
-        place = (group.first_block + block)[:, None] * (24 * LANES) + corner * LANES + lane[:, None]
+        place = (group.first_block + block)[:, None] * (8 * LANES) + corner * LANES + lane[:, None]
         slots.append(place.ravel())
     node, slot = np.concatenate(nodes), np.concatenate(slots)
     order = np.lexsort((slot, node))
-    first_slot = np.searchsorted(node[order], np.arange(len(node_row) + 1)).astype(np.int64)
-    return first_slot, slot[order].astype(np.int64)
+    first_slot = np.searchsorted(node[order], np.arange(len(node_row) + 1))
+    return first_slot.astype(np.uint32), slot[order].astype(np.uint32)

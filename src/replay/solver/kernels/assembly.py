@@ -18,9 +18,6 @@ CHUNK = 512
 #: Columns of the sums over a chunk.
 KINETIC, INTERNAL_WORK, EXTERNAL_WORK, RUNAWAYS = 0, 1, 2, 3
 
-_SLOT_Y = 8 * LANES
-_SLOT_Z = 16 * LANES
-
 
 def _advance_nodes(
     nodal, count, force, first_slot, slot, mass, inverse_mass, external, dt_kick, dt_drift, speed_limit, sums
@@ -36,9 +33,9 @@ def _advance_nodes(
         Positions and velocities, updated in place.
     count : int
         Free nodes: the first `count` rows.
-    force : (n_slots,) float64
+    force : (n_slots, 3) float64
         Element forces [N].
-    first_slot, slot : int64
+    first_slot, slot : uint32
         Compressed rows: slots of node i are ``slot[first_slot[i]:first_slot[i + 1]]``.
     mass : (n,) float64
         [kg].
@@ -64,10 +61,9 @@ def _advance_nodes(
             fy = 0.0
             fz = 0.0
             for k in range(first_slot[node], first_slot[node + 1]):
-                place = slot[k]
-                fx += force[place]
-                fy += force[place + _SLOT_Y]
-                fz += force[place + _SLOT_Z]
+                fx += force[slot[k], 0]
+                fy += force[slot[k], 1]
+                fz += force[slot[k], 2]
             square = 0.0
             for axis in range(3):
                 inner = fx if axis == 0 else (fy if axis == 1 else fz)
@@ -95,7 +91,7 @@ def _gather_forces(force, first_slot, slot, begin, end, result):
         for axis in range(3):
             total = 0.0
             for k in range(first_slot[node], first_slot[node + 1]):
-                total += force[slot[k] + axis * _SLOT_Y]
+                total += force[slot[k], axis]
             result[node - begin, axis] = total
 
 

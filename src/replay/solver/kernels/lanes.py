@@ -170,9 +170,10 @@ def block_forces(
         store(after, lane, LANES, now)
         store(extra, lane, LANES, (dte,))
         store(extra, LANES + lane, LANES, energy)
-    for k in range(24):
+    for a in range(8):
         for lane in range(LANES):
-            force[block, k, lane] = out[k * LANES + lane]
+            for k in range(3):
+                force[block, a, lane, k] = out[(k * 8 + a) * LANES + lane]
     for k in range(6):
         for lane in range(LANES):
             stress[block, k, lane] = out[(24 + k) * LANES + lane]
@@ -219,8 +220,8 @@ def law_forces(
         Numerical controls.
     dt : float
         Length of the step that has moved the nodes [s]; zero before the first.
-    force : (n_blocks, 24, LANES) float64
-        Nodal forces of each element, x, y and z of its eight nodes [N] (output).
+    force : (n_blocks, 8, LANES, 3) float64
+        Nodal forces of each element; x, y and z side by side for the nodes to gather [N] (output).
     step : (n_blocks, LANES) float64
         Stable steps [s], negative for an inverted element (output).
     work : (n_blocks, 3) float64
