@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -59,16 +60,17 @@ class Checkout:
         """Path of a play's bundle."""
         return self.root / "results" / play / "bundle" / f"{play}.zip"
 
-    def replay(self, play: str, *, cores: int = 2, config: tuple[str, ...] = ()) -> str:
-        """Run the whole workflow for one play at the smallest resolution."""
+    def replay(self, play: str, *, cores: int = 2, resolution: str = "tiny", config: tuple[str, ...] = ()) -> str:
+        """Run the whole workflow for one play."""
         target = f"results/{play}/bundle/{play}.zip"
-        return self.run("snakemake", "--cores", str(cores), target, "--config", "resolution=tiny", *config)
+        return self.run("snakemake", "--cores", str(cores), target, "--config", f"resolution={resolution}", *config)
 
     def planned(self, play: str) -> list[str]:
         """Rules that the workflow would run now."""
         target = f"results/{play}/bundle/{play}.zip"
-        output = self.run("snakemake", "-n", "--quiet", "rules", target, "--config", "resolution=tiny")
-        return [line.split()[1].rstrip(":") for line in output.splitlines() if line.startswith(("rule ", "localrule "))]
+        output = self.run("snakemake", target, "-n", "--quiet", "rules", "--config", "resolution=tiny")
+        table = re.findall(r"^(\w+) +\d+$", output, flags=re.MULTILINE)
+        return [rule for rule in table if rule not in ("all", "total")]
 
 
 def make_checkout(repository: Path, root: Path) -> Checkout:

@@ -78,7 +78,7 @@ def test_a_touched_source_reruns_nothing(copied: Checkout) -> None:
 def test_one_and_two_threads_give_the_same_bytes(finished: Checkout, fresh: Checkout) -> None:
     fresh.replay("demo", cores=1)
     shown = fresh.run("replay", "compare", str(finished.bundle("demo")), str(fresh.bundle("demo")))
-    assert re.search(r"\d+ exact artifacts identical", shown), shown
+    assert re.search(r"the runs agree: .*\b\d{2,} same", shown), shown
     for path in sorted((finished.root / "results/demo").rglob("manifest.json")):
         other = fresh.root / path.relative_to(finished.root)
         assert path.read_bytes() == other.read_bytes(), path.parent.name
@@ -89,7 +89,7 @@ def test_footage_that_cannot_carry_it_is_refused_and_sealed_all_the_same(fresh: 
     said = verdict(fresh, "broadcast")
     assert said["status"] == "rejected"
     assert said["stopped_by"] == "reconstruction"
-    assert "rejected" in fresh.run("replay", "verdict", "results/broadcast", expect=3)
+    assert "REJECTED" in fresh.run("replay", "verdict", "results/broadcast", expect=3)
     fresh.run("replay", "verify", str(fresh.bundle("broadcast")))
     assert fresh.run("replay", "reconstruct", "broadcast", expect=3).count("Traceback") == 0
 
@@ -106,7 +106,7 @@ def test_a_measured_mouthguard_impact_runs_to_a_sealed_bundle(fresh: Checkout, s
     play.mkdir(parents=True)
     text = (Path(__file__).parent / "mouthguard.yaml").read_text()
     (play / "play.yaml").write_text(text.replace("IMPACT", str(shared / "real/mouthguard/impact_1.csv")))
-    fresh.replay("mouthguard", config=("plays_folder=plays",))
+    fresh.replay("mouthguard", resolution="coarse", config=("plays_folder=plays",))
     assert verdict(fresh, "mouthguard")["status"].startswith("accepted")
     fresh.run("replay", "verify", str(fresh.bundle("mouthguard")))
 
@@ -124,7 +124,7 @@ def test_a_killed_run_goes_on_from_its_checkpoint_to_the_same_bytes(copied: Chec
     run.wait()
     assert not (replay / "manifest.json").exists()
     output = copied.run("replay", "solve", "demo", "--threads", "1")
-    assert "resum" in output
+    assert "goes on from" in output
     for name in ("states.vtkhdf", "energy.csv", "histories.csv", "manifest.json"):
         assert (replay / name).read_bytes() == (finished.root / "results/demo/replay" / name).read_bytes(), name
 
