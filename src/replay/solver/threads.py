@@ -13,8 +13,8 @@ import numba
 
 #: Fewer blocks of elements are never worth another thread.
 _BLOCKS_PER_THREAD = 48
-_TRIAL_STEPS = 24
-_PERIOD_STEPS = 4000
+_TRIAL_STEPS = 12
+_PERIOD_STEPS = 1000
 
 
 class ThreadChoice:

@@ -17,6 +17,9 @@ with twice the last stress for B keeps elements from being crushed flat.
 - Rate: ``r = 1 + c ln(1 + x / x_0)`` with the closing rate x = max(-tr D, 0) averaged over a time, so that the noise
   of a single step is not amplified; unloading is not stiffened.
 
+The hourglass stiffness takes half of the curve's secant at 10 % strain, or of the initial slope where that is less: a
+constant, so that hourglass forces store and return energy whatever the foam does.
+
 The foam recovers its shape. Permanent set is not modelled: over an impact of some 30 ms, hysteresis is
 what decides the rebound.
 """
@@ -49,11 +52,12 @@ INITIAL_STRESS = False
 TOTAL_FORM = True
 #: Ramps that make up the curve.
 KNOTS = 12
-_SETTINGS = 8
+_SETTINGS = 9
 N_CONSTANTS = _SETTINGS + 2 * KNOTS
 _YIELD_KNOTS = (0.4, 1.0, 2.5)
 _CRUSH_KNOTS = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.87, 0.93)
 _SOLID = 2.0
+_HOURGLASS_STRAIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -132,6 +136,14 @@ class Parameters:
         strains = (0.0, *begin, *(e for e in _CRUSH_KNOTS if not begin or e > 1.2 * begin[-1]))
         return strains, tuple(self._stress(e) for e in strains)
 
+    def _nominal(self, e: float) -> float:
+        """Nominal stress [Pa] at a strain, linear between the points of the curve."""
+        strains, stresses = self.loading_curve()
+        for (a, f), (b, g) in pairwise(zip(strains, stresses)):
+            if e <= b:
+                return f + (g - f) * (e - a) / (b - a)
+        return stresses[-1]
+
     def _stress(self, e: float) -> float:
         """Plateau that begins with Young's modulus, plus densification that doubles it at the strain asked for."""
         elastic = self.youngs_modulus_pa * e
@@ -158,6 +170,7 @@ class Parameters:
             slopes[0],
             1.0 - strains[-1],
             _SOLID * stresses[-1],
+            0.5 * min(slopes[0], self._nominal(_HOURGLASS_STRAIN) / _HOURGLASS_STRAIN),
         )
         return (*settings, *places, *changes)
 
@@ -178,18 +191,18 @@ def _ramp(s, place, change):
 @device
 def _phi(s, p):
     """The curve at `s`: value, slope, integral; a sum of twelve ramps, in their order."""
-    v0, d0, w0 = _ramp(s, p[8], p[20])
-    v1, d1, w1 = _ramp(s, p[9], p[21])
-    v2, d2, w2 = _ramp(s, p[10], p[22])
-    v3, d3, w3 = _ramp(s, p[11], p[23])
-    v4, d4, w4 = _ramp(s, p[12], p[24])
-    v5, d5, w5 = _ramp(s, p[13], p[25])
-    v6, d6, w6 = _ramp(s, p[14], p[26])
-    v7, d7, w7 = _ramp(s, p[15], p[27])
-    v8, d8, w8 = _ramp(s, p[16], p[28])
-    v9, d9, w9 = _ramp(s, p[17], p[29])
-    va, da, wa = _ramp(s, p[18], p[30])
-    vb, db, wb = _ramp(s, p[19], p[31])
+    v0, d0, w0 = _ramp(s, p[9], p[21])
+    v1, d1, w1 = _ramp(s, p[10], p[22])
+    v2, d2, w2 = _ramp(s, p[11], p[23])
+    v3, d3, w3 = _ramp(s, p[12], p[24])
+    v4, d4, w4 = _ramp(s, p[13], p[25])
+    v5, d5, w5 = _ramp(s, p[14], p[26])
+    v6, d6, w6 = _ramp(s, p[15], p[27])
+    v7, d7, w7 = _ramp(s, p[16], p[28])
+    v8, d8, w8 = _ramp(s, p[17], p[29])
+    v9, d9, w9 = _ramp(s, p[18], p[30])
+    va, da, wa = _ramp(s, p[19], p[31])
+    vb, db, wb = _ramp(s, p[20], p[32])
     return (
         v0 + v1 + v2 + v3 + v4 + v5 + v6 + v7 + v8 + v9 + va + vb,
         d0 + d1 + d2 + d3 + d4 + d5 + d6 + d7 + d8 + d9 + da + db,
@@ -201,7 +214,7 @@ def _phi(s, p):
 def update(motion, stress, state, dt, p):
     """Stress, largest energy and mean closing rate after the step."""
     unloading, cutoff, rate_coefficient, per_reference, per_average, initial = p[0], p[1], p[2], p[3], p[4], p[5]
-    solid_ratio, solid = p[6], p[7]
+    solid_ratio, solid, keeping = p[6], p[7], p[8]
     largest, rate = state[0], state[1]
 
     f = motion.deformation
@@ -237,5 +250,4 @@ def update(motion, stress, state, dt, p):
     longest = largest_eigenvalue_bound(left_cauchy_green(f))
     hurried = rate_coefficient * phi * per_reference * per_average / (1.0 + rate * per_reference)
     modulus = (max(slope, secant) * stiffening + 2.0 * hurried) * longest * max(inverse, 1.0)
-    keeping = 0.5 * max(eta * secant, 0.1 * initial)
     return new, (largest, rate), Moduli(select(squeezed > 1.0, solid * squeezed, 0.0), 0.5 * modulus, keeping)
