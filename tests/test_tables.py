@@ -76,6 +76,15 @@ def test_all_errors_come_at_once(tmp_path: Path) -> None:
     assert [error.line for error in caught.value.errors] == [2, 3]
 
 
+def test_one_mistake_on_many_lines_is_one_problem(tmp_path: Path) -> None:
+    rows = "".join(f"{k},LM1,{k}.5,\n" for k in range(1, 15)).replace(".5", ",5")
+    with pytest.raises(
+        InputErrors, match=r"clicks.csv:2: 5 cells(.|\n)*decimal commas(.|\n)*also: line 3, 4,"
+    ) as caught:
+        CLICKS.read(written(tmp_path, "frame,landmark_id,u_px,weight\n" + rows))
+    assert str(caught.value).count("mend:") == 1
+
+
 def test_a_latin_1_file_is_refused_with_the_mend(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not UTF-8"):
         CLICKS.read(written(tmp_path, GOOD.replace("LM1", "LMé"), "latin-1"))

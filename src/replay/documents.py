@@ -226,7 +226,8 @@ def _sentence(
     elif kind in _BOUNDS and ctx:
         sign, key = _BOUNDS[kind]
         found, expected = f"{_shown(value)}{unit_text} is out of range", f"{sign} {ctx[key]}{unit_text}"
-        mend = _description(owner, name) or mend
+        meaning = _description(owner, name)
+        mend = f"correct the value: {meaning}" if meaning else mend
     return InputError(path, found, line=line, column=_dotted(at), expected=expected, mend=mend)
 
 

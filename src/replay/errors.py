@@ -6,7 +6,10 @@ a traceback is for our own mistakes, never for a user's input.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+
+_MOST_LINES = 8
 
 
 class ReplayError(Exception):
@@ -63,14 +66,30 @@ class InputError(ReplayError):
 
 
 class InputErrors(ReplayError):
-    """Several `InputError` of one reading, so that a user mends them all at once."""
+    """Several `InputError` of one reading, so that a user mends them all at once.
+
+    One mistake made on many lines (every row with a decimal comma) is one problem: its first line is shown,
+    the others are named.
+    """
 
     exit_code = 2
 
     def __init__(self, errors: list[InputError]) -> None:
         self.errors = errors
-        count = f"{len(errors)} problems\n" if len(errors) > 1 else ""
-        super().__init__(count + "\n".join(str(e) for e in errors))
+        kinds: dict[tuple[str, str | None, str, str], list[InputError]] = {}
+        for error in errors:
+            kind = (error.file, error.column, re.sub(r"[-+.\d]+", "#", error.found), error.mend)
+            kinds.setdefault(kind, []).append(error)
+        count = f"{len(kinds)} problems\n" if len(kinds) > 1 else ""
+        super().__init__(count + "\n".join(_with_other_lines(alike) for alike in kinds.values()))
+
+
+def _with_other_lines(alike: list[InputError]) -> str:
+    lines = [str(error.line) for error in alike[1:] if error.line is not None]
+    if not lines:
+        return str(alike[0])
+    shown = ", ".join(lines[:_MOST_LINES]) + (" ..." if len(lines) > _MOST_LINES else "")
+    return f"{alike[0]}\n    also: line {shown}"
 
 
 class GateError(ReplayError):
