@@ -43,7 +43,7 @@ check: $(READY)
 	$(IN) snakemake --lint
 
 bench: $(READY)
-	$(IN) python -m benchmarks
+	$(IN) python benchmarks/element_cycles.py 32 64
 
 report: $(READY)
 	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip $(CONFIG)

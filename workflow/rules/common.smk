@@ -5,7 +5,14 @@ from pathlib import Path
 import yaml
 
 SOURCE = Path(workflow.basedir) / "src" / "replay"
-LEAVES = ("documents.py", "errors.py", "files.py", "tables.py", "manifest.py", "play.py")
+LEAVES = (
+    "documents.py",
+    "errors.py",
+    "files.py",
+    "tables.py",
+    "manifest.py",
+    "play.py",
+)
 PLAYS = config["plays_folder"]
 TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
 _held = []
@@ -38,6 +45,11 @@ def play_files(wildcards):
     except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
         return []
     return [(folder / name).as_posix() for name in names if (folder / name).is_file()]
+
+
+def folder_of_plays(wildcards, input):
+    """Folder that holds the folder of the play's description."""
+    return Path(input.play).parents[1].as_posix()
 
 
 def stage(name):

@@ -10,7 +10,7 @@ rule settings:
     log:
         log("settings"),
     params:
-        plays=PLAYS,
+        plays=folder_of_plays,
         resolution=config.get("resolution") or "as-the-play-says",
     message:
         "{wildcards.play}: check and resolve the play's settings"
@@ -21,6 +21,7 @@ rule settings:
 rule inputs:
     input:
         settings=stage("settings"),
+        play=f"{PLAYS}/{{play}}/play.yaml",
         tracks=play_files,
         code=code("stages/inputs.py", "stages/frame.py", "motion"),
     output:
@@ -28,7 +29,7 @@ rule inputs:
     log:
         log("inputs"),
     params:
-        plays=PLAYS,
+        plays=folder_of_plays,
     message:
         "{wildcards.play}: check the raw tracks and keep copies with their hashes"
     shell:
