@@ -53,6 +53,7 @@ rule report:
 
 rule seal:
     input:
+        play=f"{PLAYS}/{{play}}/play.yaml",
         report=stage("report"),
         lock="environment.lock",
         code=code("stages/seal.py", "stages/frame.py", "bundle"),
@@ -61,7 +62,9 @@ rule seal:
         digest="results/{play}/bundle/{play}.zip.sha256",
     log:
         log("seal"),
+    params:
+        plays=folder_of_plays,
     message:
         "{wildcards.play}: seal the bundle"
     shell:
-        "replay seal {wildcards.play} 2>&1 | tee {log}"
+        "replay seal {wildcards.play} --plays {params.plays} 2>&1 | tee {log}"
