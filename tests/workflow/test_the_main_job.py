@@ -52,6 +52,16 @@ def test_a_second_run_does_nothing(finished: Checkout) -> None:
     assert "Nothing to be done" in finished.replay("demo")
 
 
+def test_a_stage_whose_files_are_gone_is_run_again_before_anything_is_sealed(copied: Checkout) -> None:
+    import shutil
+
+    shutil.rmtree(copied.root / "results/demo/fidelity")
+    copied.bundle("demo").unlink()
+    output = copied.run("replay", "seal", "demo", expect=2)
+    assert "replay fidelity" in output
+    assert {"fidelity", "verdict", "report", "seal"} == set(copied.planned("demo"))
+
+
 def test_an_edited_click_reruns_from_the_reconstruction_on(copied: Checkout) -> None:
     clicks = copied.root / "config/plays/demo/kinovea_clicks.csv"
     lines = clicks.read_text().splitlines()

@@ -57,6 +57,22 @@ def stage(name):
     return f"results/{{play}}/{name}/manifest.json"
 
 
+# Every stage before the verdict. What reads them all names them all: a stage whose files were removed is run again.
+EVIDENCE = (
+    "settings",
+    "inputs",
+    "reconstruction",
+    "driver",
+    "assembly",
+    "decks",
+    "shake",
+    "replay",
+    "sensitivity",
+    "fidelity",
+    "measures",
+)
+
+
 def log(name):
     return f"results/{{play}}/logs/{name}.log"
 

@@ -3,21 +3,8 @@
 
 rule verdict:
     input:
-        settings=stage("settings"),
-        stages=[
-            stage(name)
-            for name in (
-                "reconstruction",
-                "assembly",
-                "shake",
-                "replay",
-                "sensitivity",
-                "fidelity",
-                "measures",
-                "decks",
-            )
-        ],
-        code=code("stages/verdict.py", "stages/frame.py", "gates"),
+        stages=[stage(name) for name in EVIDENCE],
+        code=code("stages/verdict.py", "stages/frame.py", "gates", "bundle"),
     output:
         stage("verdict"),
     log:
@@ -30,7 +17,7 @@ rule verdict:
 
 rule report:
     input:
-        verdict=stage("verdict"),
+        stages=[stage(name) for name in (*EVIDENCE, "verdict")],
         code=code("stages/report.py", "stages/frame.py", "report"),
     output:
         manifest=stage("report"),
@@ -54,7 +41,7 @@ rule report:
 rule seal:
     input:
         play=f"{PLAYS}/{{play}}/play.yaml",
-        report=stage("report"),
+        stages=[stage(name) for name in (*EVIDENCE, "verdict", "report")],
         lock="environment.lock",
         code=code("stages/seal.py", "stages/frame.py", "bundle"),
     output:

@@ -74,12 +74,7 @@ class Stage:
         self.folder = workspace.folder(name)
         self._before: dict[str, StageManifest] = {}
         for stage in after:
-            try:
-                self._before[stage] = check_manifest(workspace.folder(stage))
-            except InputError as error:
-                raise InputError(
-                    error.file, error.found, expected=error.expected, mend=f"run `replay {_COMMANDS[stage]}` again"
-                ) from None
+            self._before[stage] = check_stage(workspace, stage)
         self._inputs: dict[str, Path] = {}
         self._artifacts: list[Artifact] = []
         self._keep = (*keep, _LOCK)
@@ -218,6 +213,22 @@ class Stage:
         )
 
 
+def check_stage(workspace: Workspace, stage: str) -> StageManifest:
+    """Manifest of a finished stage whose files are all there and unchanged.
+
+    Raises
+    ------
+    InputError
+        Naming the file, and the command that makes it again.
+    """
+    try:
+        return check_manifest(workspace.folder(stage))
+    except InputError as error:
+        raise InputError(
+            error.file, error.found, expected=error.expected, mend=f"run `replay {_COMMANDS[stage]}` again"
+        ) from None
+
+
 _COMMANDS = {
     "settings": "settings",
     "inputs": "inputs",
@@ -232,6 +243,6 @@ _COMMANDS = {
     "measures": "measure",
     "verdict": "judge",
     "report": "report",
-    "bundle": "seal",
 }
 STAGES = tuple(_COMMANDS)
+"""Every stage with a manifest, in the order of the protocol."""

@@ -5,11 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 from replay.bundle import seal, verify
-from replay.stages.frame import Workspace
+from replay.stages.frame import STAGES, Workspace, check_stage
 
 
 def run(workspace: Workspace) -> str | None:
-    """Seal everything the stages made, and verify the archive once as its receiver will."""
+    """Seal everything the stages made, and verify the archive once as its receiver will.
+
+    Raises
+    ------
+    InputError
+        When a stage is missing: a play that was stopped has the manifests of its skipped stages, so a bundle
+        without one would hide something.
+    """
+    for stage in STAGES:
+        check_stage(workspace, stage)
     destination = workspace.folder("bundle") / f"{workspace.play}.zip"
     records = Path(".snakemake/metadata")
     digest = seal(
