@@ -63,7 +63,7 @@ def _parser() -> argparse.ArgumentParser:
         if name in _SOLVING:
             command.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
             command.add_argument(
-                "--checkpoint-every", type=float, default=60.0, metavar="SECONDS", help="wall-clock checkpoint period"
+                "--checkpoint-every", type=float, default=10.0, metavar="SECONDS", help="wall-clock checkpoint period"
             )
 
     verdict = commands.add_parser("verdict", help="print the verdict of a finished run; exit 3 when it is rejected")

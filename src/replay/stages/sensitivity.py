@@ -16,7 +16,7 @@ from replay.stages.verdict import limits_of
 _FACTOR = 0.5
 
 
-def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 60.0) -> str | None:
+def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 10.0) -> str | None:
     """Run again with half the coefficient and compare every region of the brain.
 
     The energy ledger cannot see a soft tissue that hourglass control holds; this run can.

@@ -15,7 +15,7 @@ from replay.stages.solve import RUN_FILES, UNFINISHED, run_solver
 from replay.stages.verdict import limits_of
 
 
-def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 60.0) -> str | None:
+def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 10.0) -> str | None:
     """Fly the helmet with the controls of the replay and judge whether it flies undisturbed."""
     stage = Stage(workspace, "shake", after=["settings", "assembly"], keep=UNFINISHED)
     if stage.stopped_by:

@@ -35,7 +35,7 @@ BRAIN_FILES = {
 UNFINISHED = ("checkpoint", "states.partial")
 
 
-def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 60.0) -> str | None:
+def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 10.0) -> str | None:
     """Replay the impact with the driven skull, going on from a checkpoint where there is one."""
     stage = Stage(workspace, "replay", after=["settings", "assembly", "driver", "shake"], keep=UNFINISHED)
     if stage.stopped_by:
