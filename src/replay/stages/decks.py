@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
-from scipy.spatial.transform import Rotation
 
 from replay import decks
 from replay.models import Model, read_model
-from replay.motion import DRIVER
+from replay.motion import Kinematics
 from replay.play import Play
 from replay.stages.frame import Stage, Workspace
 from replay.stages.settings import read_settings
@@ -25,7 +23,7 @@ def run(workspace: Workspace) -> str | None:
         return stage.skip()
     play = read_settings(stage)
     model = read_model(stage.read("assembly", "model.h5"))
-    driver = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
+    driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
     deck = deck_input(play, model, driver)
     folder = stage.folder_for_many()
     for solver, write in (("velodyne", decks.write_velodyne), ("lsdyna", decks.write_lsdyna)):
@@ -34,17 +32,14 @@ def run(workspace: Workspace) -> str | None:
     return stage.finish()
 
 
-def deck_input(play: Play, model: Model, driver: pd.DataFrame) -> decks.DeckInput:
+def deck_input(play: Play, model: Model, driver: Kinematics) -> decks.DeckInput:
     """What both writers need: the solver's own problem, in their terms."""
-    position = driver[["x_m", "y_m", "z_m"]].to_numpy()
-    velocity = driver[[f"v{axis}_m_per_s" for axis in "xyz"]].to_numpy()
-    omega = driver[[f"omega_{axis}_rad_per_s" for axis in "xyz"]].to_numpy()
-    start = Rotation.from_quat(driver[["qx", "qy", "qz", "qw"]].to_numpy()[0])
-    speed, p, q = decks.axis_through(position[0], omega[0])
+    position = driver.position_m[0]
+    speed, p, q = decks.axis_through(position, driver.omega_rad_per_s[0])
     settings = play.solver
     return decks.DeckInput(
         title=f"{play.name}: {play.title}" if play.title else play.name,
-        nodes=position[0] + start.apply(model.nodes),
+        nodes=position + driver.rotation[0].apply(model.nodes),
         node_ids=model.node_ids,
         hexes=model.hexes,
         element_ids=model.element_ids,
@@ -62,12 +57,14 @@ def deck_input(play: Play, model: Model, driver: pd.DataFrame) -> decks.DeckInpu
             bulk_viscosity_linear=settings.bulk_viscosity.linear,
             mass_scaling_time_step_s=settings.mass_scaling_time_step_s,
         ),
-        initial_velocities=(decks.InitialVelocity(model.part_set_ids[_EVERYTHING], _triple(velocity[0]), speed, p, q),),
+        initial_velocities=(
+            decks.InitialVelocity(model.part_set_ids[_EVERYTHING], _triple(driver.velocity_m_per_s[0]), speed, p, q),
+        ),
         driver=decks.Driver(
             pid=next(part.pid for part in model.parts if part.role == "skull"),
-            time_s=driver["time_s"].to_numpy(),
-            velocity_m_per_s=velocity,
-            omega_rad_per_s=omega,
+            time_s=driver.time_s,
+            velocity_m_per_s=driver.velocity_m_per_s,
+            omega_rad_per_s=driver.omega_rad_per_s,
         ),
         notes=tuple(model.info["notes"]),
     )

@@ -7,7 +7,7 @@ import pandas as pd
 from replay.files import write_json
 from replay.gates import fidelity_gate
 from replay.measures import Motion, fidelity
-from replay.models import read_model
+from replay.models import Model, read_model
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
 from replay.stages.verdict import limits_of
@@ -18,8 +18,9 @@ def run(workspace: Workspace) -> str | None:
     stage = Stage(workspace, "fidelity", after=["settings", "assembly", "driver", "replay"])
     if stage.stopped_by:
         return stage.skip()
+    model = read_model(stage.read("assembly", "model.h5"))
     target = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
-    result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage))
+    result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage, model))
     write_json(stage.write("fidelity.json", "target against applied motion, article Table 4"), result)
     gate = fidelity_gate(
         {**result, **{name: _judged(result[name]) for name in _QUANTITIES}}, limits_of(stage), prescribed=True
@@ -31,9 +32,8 @@ def run(workspace: Workspace) -> str | None:
 _QUANTITIES = ("linear_acceleration", "angular_acceleration", "angular_velocity")
 
 
-def skull_motion(stage: Stage) -> Motion:
+def skull_motion(stage: Stage, model: Model) -> Motion:
     """Motion of the driven skull, from the solver's histories."""
-    model = read_model(stage.read("assembly", "model.h5"))
     skull = next(part.pid for part in model.parts if part.role == "skull")
     return Motion.from_history(pd.read_csv(stage.read("replay", "histories.csv")), skull)
 

@@ -43,7 +43,7 @@ def run(workspace: Workspace) -> str | None:
         stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
         {
             "statement": "process diagnostics; no statement on injury or on a player",
-            "head": head_measures(in_head_axes(skull_motion(stage)), file="replay/histories.csv"),
+            "head": head_measures(in_head_axes(skull_motion(stage, model)), file="replay/histories.csv"),
             "brain": regional_summary(brain),
             "brain_convergence_class": convergence_class(gate),
             "action": {

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
-from scipy.spatial.transform import Rotation
 
 from replay.models import Model, select_assembly
+from replay.motion import Kinematics
 from replay.play import Play
 from replay.solver import Controls, Material, PrescribedMotion, Problem, SolverPart
 
@@ -40,7 +39,7 @@ def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hou
     )
 
 
-def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Problem:
+def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Problem:
     """Head and helmet with the skull driven along the play's motion.
 
     The model stands at the driver's first pose and moves as one rigid body with its first velocity, so that
@@ -51,30 +50,26 @@ def driven_problem(model: Model, driver: pd.DataFrame, controls: Controls) -> Pr
     model
         In head axes, origin at the head's centre of gravity.
     driver
-        Rows of ``driver_6dof.csv``: the motion of that centre, global axes.
+        ``driver_6dof.csv``: the motion of that centre, global axes.
     controls
         Numerical settings.
     """
-    position = driver[["x_m", "y_m", "z_m"]].to_numpy()
-    quaternion = driver[["qx", "qy", "qz", "qw"]].to_numpy()
-    velocity = driver[["vx_m_per_s", "vy_m_per_s", "vz_m_per_s"]].to_numpy()
-    omega = driver[[f"omega_{axis}_rad_per_s" for axis in "xyz"]].to_numpy()
-    arms = Rotation.from_quat(quaternion[0]).apply(model.nodes)
+    arms = driver.rotation[0].apply(model.nodes)
     parts = _parts(model)
     return Problem(
-        nodes=position[0] + arms,
+        nodes=driver.position_m[0] + arms,
         hexes=model.hexes,
         element_part=model.element_part,
         parts=parts,
         controls=controls,
-        initial_velocity=velocity[0] + np.cross(omega[0], arms),
+        initial_velocity=driver.velocity_m_per_s[0] + np.cross(driver.omega_rad_per_s[0], arms),
         prescribed=PrescribedMotion(
             pids=tuple(part.pid for part in model.parts if part.role == "skull"),
-            times=driver["time_s"].to_numpy(),
-            positions=position,
-            quaternions=quaternion,
-            velocities=velocity,
-            angular_velocities=omega,
+            times=driver.time_s,
+            positions=driver.position_m,
+            quaternions=driver.rotation.as_quat(),
+            velocities=driver.velocity_m_per_s,
+            angular_velocities=driver.omega_rad_per_s,
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,

@@ -17,7 +17,7 @@ from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace
 from replay.stages.settings import read_settings
-from replay.stages.verdict import GATE_FILES, limits_of
+from replay.stages.verdict import ALL_GATE_FILES, GATE_FILES, limits_of
 
 _TITLES = {
     "inputs": "Raw tracks",
@@ -72,7 +72,7 @@ def collect(stage: Stage) -> ReportInput:
     known: dict[str, Any] = {
         "play": _play_facts(play, quality, inputs),
         "verdict": read_json(stage.read("verdict", "verdict.json")),
-        "gates": _gates(stage),
+        "gates": _gates(stage, limits),
         "gate_facts": {
             name: {"title": facts.title, "source": facts.source, "stops_run": facts.stops_run}
             for name, facts in limits.gates.items()
@@ -101,7 +101,7 @@ def collect(stage: Stage) -> ReportInput:
 def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     """What only a replay that ran to its end has."""
     measures = read_json(stage.read("measures", "measures.json"))
-    applied = skull_motion(stage)
+    applied = skull_motion(stage, model)
     fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
     return {
@@ -138,14 +138,14 @@ def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> 
     }
 
 
-def _gates(stage: Stage) -> list[Any]:
+def _gates(stage: Stage, limits: Limits) -> list[Any]:
     found = {}
-    for name, files in {**GATE_FILES, "verdict": ("gate.json",)}.items():
+    for name, files in ALL_GATE_FILES.items():
         for file in files:
             if stage.made(name, file):
                 gate = read_json(stage.read(name, file))
                 found[gate["gate"]] = gate
-    return [found[name] for name in Limits.load().gates if name in found]
+    return [found[name] for name in limits.gates if name in found]
 
 
 def _stages(stage: Stage) -> list[dict[str, str]]:

@@ -30,16 +30,13 @@ def run(workspace: Workspace, *, resolution: str | None = None) -> str | None:
     stage = Stage(workspace, "settings")
     stage.read_file("play.yaml", workspace.description)
     source = {
-        key: Path(value).name if key in _TRACKS and value else value
+        key: Path(value).name if value in play.source.files else value
         for key, value in play.source.model_dump(mode="json").items()
     }
     resolved = {**play.model_dump(mode="json"), "source": source}
     write_json(stage.write(FILE, "the play with every default spelled out"), resolved)
     print(f"{play.name}: {play.title or 'no title'} ({play.source.kind}, {play.model.resolution})")
     return stage.finish()
-
-
-_TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
 
 
 def read_settings(stage: Stage) -> Play:

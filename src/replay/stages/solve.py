@@ -10,7 +10,7 @@ from replay.files import read_json
 from replay.gates import Gate, numerics_gate, part_energies
 from replay.measures import BrainRecorder
 from replay.models import Model, read_model
-from replay.motion import DRIVER
+from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
 from replay.stages.frame import Stage, Workspace
 from replay.stages.problem import controls_of, driven_problem
@@ -60,7 +60,7 @@ def run_driven(
     """
     play = read_settings(stage)
     model = read_model(stage.read("assembly", "model.h5"))
-    driver = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
+    driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
     controls = controls_of(
         play, play.window.duration_s, checkpoint_every_s=checkpoint_every_s, hourglass_factor=hourglass_factor
     )

@@ -13,7 +13,7 @@ from replay.gates import Gate, Limits, read_gate
 from replay.motion import synthesise
 from replay.motion.synthetic import Preset
 from replay.play import load_play, play_schema_text
-from replay.stages.verdict import GATE_FILES
+from replay.stages.verdict import ALL_GATE_FILES
 
 _COLOURS = {"pass": "32", "warn": "33", "fail": "31", "not reached": "90"}
 
@@ -32,7 +32,7 @@ def show_verdict(results: Path) -> int:
     verdict = read_json(path)
     limits = Limits.load()
     found: dict[str, Gate] = {}
-    for stage, files in {**GATE_FILES, "verdict": ("gate.json",)}.items():
+    for stage, files in ALL_GATE_FILES.items():
         for file in files:
             if (results / stage / file).is_file():
                 judged = read_gate(results / stage / file, limits)

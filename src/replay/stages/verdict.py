@@ -19,6 +19,8 @@ GATE_FILES = {
     "sensitivity": ("gate.json",),
     "fidelity": ("gate.json",),
 }
+ALL_GATE_FILES = {**GATE_FILES, "verdict": ("gate.json",)}
+"""With the package gate, which the verdict stage judges itself."""
 _AFTER = ("settings", "reconstruction", "assembly", "decks", "shake", "replay", "sensitivity", "fidelity", "measures")
 
 
