@@ -92,12 +92,6 @@ def _with_other_lines(alike: list[InputError]) -> str:
     return f"{alike[0]}\n    also: line {shown}"
 
 
-class GateError(ReplayError):
-    """A gate of the protocol refuses the play; the message names the checks that failed."""
-
-    exit_code = 3
-
-
 class InstabilityError(ReplayError):
     """The solver stopped itself: NaN, runaway speed, an inverted element, a collapsed time step."""
 

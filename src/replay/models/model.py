@@ -23,7 +23,6 @@ SCHEMA = "replay-model"
 SCHEMA_VERSION = 1
 
 ROLES = ("brain", "csf", "skull", "scalp", "comfort_pad", "energy_pad", "shell", "facemask", "chin_cup")
-ASSEMBLIES = ("head", "helmet")
 
 _DATASETS = {
     "nodes/coordinates_m": ("nodes", "f8", 3),

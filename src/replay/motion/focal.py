@@ -175,7 +175,3 @@ def frame_focal(
         schur = h[6, 6] - h[6, :6] @ np.linalg.lstsq(h[:6, :6], h[:6, 6], rcond=None)[0]
         sigma[k] = 1.0 / np.sqrt(max(schur, 1e-12))
     return mixed, sigma, own
-
-
-def _where(mask: np.ndarray, yes: np.ndarray, no: np.ndarray) -> np.ndarray:
-    return np.where(mask.reshape(-1, *[1] * (yes.ndim - 1)), yes, no)

@@ -180,10 +180,6 @@ class Bodies:
                 total += 0.5 * float(self.mass[body] * (self.velocity[body] ** 2).sum() + turning)
         return total
 
-    def body_of_part(self, part: int) -> int | None:
-        """Number of the body that a part belongs to, if any."""
-        return next((k for k, parts in enumerate(self.parts) if part in parts), None)
-
     def tied_rows(self, body: int) -> slice:
         """Solver rows of the nodes of a body."""
         return slice(int(self._first + self._begin[body]), int(self._first + self._end[body]))

@@ -60,12 +60,6 @@ def column(m, j):
 
 
 @device
-def determinant(m):
-    """Determinant of a matrix."""
-    return dot(m[0], cross(m[1], m[2]))
-
-
-@device
 def trace(s):
     """Trace of a symmetric tensor."""
     return s[0] + s[1] + s[2]
