@@ -103,3 +103,11 @@ def test_all_bad_settings_are_told_at_once():
     with pytest.raises(InputErrors, match="2 problems") as caught:
         Limits.load({"nothing.at_all": 1, "helmet.mass_kg": 3}, file="plays/demo/play.yaml")
     assert "plays/demo/play.yaml" in str(caught.value)
+
+
+def test_the_play_and_the_gate_agree_on_what_a_helmet_weighs():
+    from replay.play import HELMET_MASS_KG, HELMET_MASS_RANGE_KG
+
+    bounds = Limits.load()["helmet.mass_kg"].bounds
+    assert bounds["fail_below"] == pytest.approx(HELMET_MASS_KG - HELMET_MASS_RANGE_KG)
+    assert bounds["fail_above"] == pytest.approx(HELMET_MASS_KG + HELMET_MASS_RANGE_KG)
