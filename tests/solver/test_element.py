@@ -12,6 +12,7 @@ import pytest
 from numba.core import config
 
 from replay.solver import Controls, Material, Problem, SolverPart
+from replay.solver.blocks import structured_block
 from replay.solver.elements import ElementGroup, law_kernel
 from replay.solver.integrator import Integrator
 from replay.solver.kernels import tensors
@@ -30,13 +31,6 @@ def crooked(seed: int, n: int = 20) -> tuple[np.ndarray, np.ndarray]:
 def problem(nodes: np.ndarray, hexes: np.ndarray, material: Material, **fields: Any) -> Problem:
     controls = fields.pop("controls", Controls(1.0, mass_scaling_time_step_s=0.0))
     return Problem(nodes, hexes, np.zeros(len(hexes), int), (SolverPart(1, "p", material),), controls, **fields)
-
-
-def element_forces(group: ElementGroup, count: int) -> np.ndarray:
-    result = np.zeros((count, 8, 3))
-    filled = group.group.filled
-    result[group.group.rows[filled]] = group.force.transpose(0, 2, 1, 3)[filled]
-    return result
 
 
 def per_element(group: ElementGroup, values: np.ndarray, count: int) -> np.ndarray:
@@ -60,7 +54,7 @@ def test_fast_element_agrees_with_the_textbook() -> None:
     order = run.layout.node_order
     run.nodal[:, 4:7] = velocity[order]
     group.forces(run.nodal, dt)
-    forces = element_forces(group, len(hexes))
+    forces = run.inner_forces()[hexes]  # no node is shared
     new_stress = per_element(group, group.stress, len(hexes))
     new_hourglass = per_element(group, group.hourglass, len(hexes))
     for e in range(len(hexes)):
@@ -83,9 +77,36 @@ def test_forces_of_an_element_are_in_balance() -> None:
     group = run.groups[0]
     group.hourglass[:] = rng.normal(size=group.hourglass.shape)
     group.forces(run.nodal, 0.0)
-    f = element_forces(group, len(hexes))
+    f = run.inner_forces()[hexes]
     assert np.abs(f.sum(axis=1)).max() < 1e-13
     assert np.abs(np.cross(nodes[hexes], f).sum(axis=1)).max() < 1e-13
+
+
+def test_batches_of_two_laws_sum_like_elements_one_by_one() -> None:
+    nodes, hexes = structured_block((12, 10, 12), (1.0, 1.0, 1.0))
+    nodes += 0.01 * np.sin(17.0 * nodes[:, [1, 2, 0]])
+    elastic = Material("e", "elastic", 1000.0, {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3})
+    fluid = Material("f", "fluid", 1000.0, {"bulk_modulus_pa": 1e6, "shear_modulus_pa": 1e3})
+    parts = (SolverPart(1, "e", elastic), SolverPart(2, "f", fluid))
+    part = (nodes[hexes].mean(axis=1)[:, 0] > 0.6).astype(int)
+    controls = Controls(1.0, mass_scaling_time_step_s=0.0)
+    velocity = np.sin(11.0 * nodes[:, [2, 0, 1]])
+
+    def forces(nodes: np.ndarray, hexes: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        run = Integrator(Problem(nodes, hexes, part, parts, controls, initial_velocity=velocity), 1e9)
+        assert max(len(b.first_row) for b in run.layout.batches) > 2, "several batches"
+        for _ in range(3):
+            run.forces()
+            run.drift(1e-4, run.time_s + 1e-4)  # without a kick, both fly on alike
+        run.forces()
+        return run.inner_forces()
+
+    apart = forces(nodes[hexes].reshape(-1, 3), np.arange(hexes.size).reshape(-1, 8), velocity[hexes].reshape(-1, 3))
+    one_by_one = np.zeros_like(nodes)
+    for corner in range(8):
+        np.add.at(one_by_one, hexes[:, corner], apart.reshape(-1, 8, 3)[:, corner])
+    together = forces(nodes, hexes, velocity)
+    assert np.abs(together - one_by_one).max() < 1e-11 * np.abs(apart).max()
 
 
 def exact_frequency(x: np.ndarray, lame: float, shear: float, mass: float) -> float:
@@ -156,11 +177,11 @@ def test_packed_instructions_dominate_the_lane_loop() -> None:
     material = Material("m", "elastic", 1e3, {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3})
     group = Integrator(problem(nodes, hexes, material), 1e9).groups[0]
     arguments = group.kernel_arguments(np.zeros((len(nodes), 8)), 0.0)
-    nodal, connectivity, _, _, mass, reference, stress, hourglass, state, parameters, control, dt = arguments[:12]
+    nodal, connectivity, place, _, _, _, *fields = arguments
+    mass, reference, stress, hourglass, state, parameters, *rest = fields
     block = law_kernel("elastic").py_func.__globals__["run_block"]
     whole = (
-        0, 1, nodal, connectivity, mass, reference, stress, hourglass, state, parameters, 0, control, dt,
-        *arguments[12:],
+        0, 1, 0, nodal, connectivity, place, mass, reference, stress, hourglass, state, parameters, 0, *rest,
     )  # fmt: skip
     block.compile(tuple(numba.typeof(a) for a in whole))
     text = next(iter(block.inspect_asm().values()))

@@ -38,10 +38,12 @@ class ElementGroup:
 
     Parameters
     ----------
-    problem, layout, group
+    problem, layout
         What to build.
-    buffer : (n_blocks_of_all, 8, LANES, 3) float64
-        Nodal forces; this group writes its own blocks.
+    number : int
+        Of the group in the layout.
+    force : (n_rows, 3) float64
+        Sums of the batches of all groups; this one writes its own rows [N].
 
     Attributes
     ----------
@@ -55,9 +57,11 @@ class ElementGroup:
         Work of the last step [J].
     """
 
-    def __init__(self, problem: Problem, layout: Layout, group: BlockGroup, buffer: NDArray[np.float64]) -> None:
+    def __init__(self, problem: Problem, layout: Layout, number: int, force: NDArray[np.float64]) -> None:
+        group: BlockGroup = layout.groups[number]
         law = LAWS[group.law]
         self.group = group
+        self._batches = layout.batches[number]
         self.law = law
         blocks = len(group.fill)
         corners = layout.node_row[problem.hexes[group.rows]]
@@ -78,7 +82,7 @@ class ElementGroup:
         self.stress = np.ascontiguousarray(problem.initial_stress[group.rows].transpose(0, 2, 1))
         self.hourglass = np.zeros((blocks, 12, LANES))
         self.state = np.zeros((blocks, state_size(law), LANES))
-        self.force = buffer[group.first_block : group.first_block + blocks]
+        self._force = force
         self.step = np.zeros((blocks, LANES))
         self.work = np.zeros((blocks, 3))
         self._control = numerical_control(problem.controls)
@@ -87,8 +91,9 @@ class ElementGroup:
     def kernel_arguments(self, nodal: NDArray[np.float64], dt: float) -> tuple[Any, ...]:
         """Arguments of `kernels.lanes.law_forces` for these elements."""
         return (
-            nodal, self._connectivity, self.group.fill, self._row, self.mass, self._reference, self.stress,
-            self.hourglass, self.state, self._parameters, self._control, dt, self.force, self.step, self.work,
+            nodal, self._connectivity, self._batches.place, self._batches.first_row, self.group.fill, self._row,
+            self.mass, self._reference, self.stress, self.hourglass, self.state, self._parameters, self._control, dt,
+            self._force, self.step, self.work,
         )  # fmt: skip
 
     def forces(self, nodal: NDArray[np.float64], dt: float) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from replay.solver.elements import ElementGroup
 from replay.solver.kernels.assembly import CHUNK, RUNAWAYS, advance_nodes, drift_nodes, gather_forces
-from replay.solver.kernels.lanes import LANES, NODE_COLUMNS, POSITION, VELOCITY
+from replay.solver.kernels.lanes import NODE_COLUMNS, POSITION, VELOCITY
 from replay.solver.layout import Layout, arrange
 from replay.solver.ledger import Energies, Ledger
 from replay.solver.problem import Problem, gradients
@@ -50,9 +50,8 @@ class Integrator:
         self.nodal = _aligned(n)
         self.nodal[:, POSITION : POSITION + 3] = problem.nodes[order]
         self.nodal[:, VELOCITY : VELOCITY + 3] = problem.initial_velocity[order]
-        self._buffer = np.zeros((max(self.layout.n_blocks, 1), 8, LANES, 3))
-        self._flat = self._buffer.reshape(-1, 3)
-        self.groups = [ElementGroup(problem, self.layout, g, self._buffer) for g in self.layout.groups]
+        self._force = np.zeros((self.layout.n_rows, 3))
+        self.groups = [ElementGroup(problem, self.layout, k, self._force) for k in range(len(self.layout.groups))]
         self.added_mass: AddedMass = scale_masses(problem, self.groups, self.nodal)
         self._lump()
         self.bodies = Bodies(problem, self.layout, self.mass, self._soft_mass)
@@ -95,6 +94,12 @@ class Integrator:
             group.forces(self.nodal, self.dt_s)
         return smallest_step(self.groups, self.ledger.part_work)
 
+    def inner_forces(self) -> NDArray[np.float64]:
+        """Sums of the element forces at the nodes, after `forces`, in the user's order (n, 3) [N]."""
+        result = np.empty((len(self.nodal), 3))
+        gather_forces(self._force, self.layout.first_slot, self.layout.slot, 0, len(self.nodal), result)
+        return self.user_order(result)
+
     def kick(self, dt_next: float, *, drift: bool) -> None:
         """Bring the velocities half a step past the present time.
 
@@ -109,13 +114,13 @@ class Integrator:
         dt_kick = 0.5 * (self.dt_s + dt_next)
         self._drifted = drift
         advance_nodes(
-            self.nodal, layout.n_free, self._flat, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
+            self.nodal, layout.n_free, self._force, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
             self._external, dt_kick, dt_next if drift else 0.0, self.speed_limit, self._sums,
         )  # fmt: skip
         if self.bodies.count:
             self._body_velocity_before = self.bodies.velocity.copy()
             first, last = layout.n_free, len(self.nodal)
-            gather_forces(self._flat, layout.first_slot, layout.slot, first, last, self.bodies.inner)
+            gather_forces(self._force, layout.first_slot, layout.slot, first, last, self.bodies.inner)
             self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next)
         self.runaways = int(self._sums[:, RUNAWAYS].sum())
         self.ledger.advance(self._sums, self.bodies.sums)

@@ -3,6 +3,10 @@
 Elements are sorted by law, part and Morton code, so that a block of sixteen has one material
 and touches few nodes; nodes stand in the order of their first use, those of rigid bodies
 after all others. Results return to the user's order through the permutations kept here.
+
+Forces are summed twice. Blocks that follow one another make a batch, the work of one thread, which sums its
+elements into rows of its own, one row a node that it touches; a node then sums its rows. Most nodes lie
+inside a batch and have one row, so that little goes through memory, and both sums have one order.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InputError
-from replay.solver.kernels.lanes import LANES
+from replay.solver.kernels.lanes import BATCH_BLOCKS, LANES
 from replay.solver.problem import WHERE, Problem
 
 _MORTON_BITS = 20
@@ -33,20 +37,33 @@ class BlockGroup:
         Elements of each block.
     part : (n_blocks,) int64
         Index into the problem's parts.
-    first_block : int
-        Of this group, counted over all groups.
     """
 
     law: str
     rows: NDArray[np.int64]
     fill: NDArray[np.int64]
     part: NDArray[np.int64]
-    first_block: int
 
     @property
     def filled(self) -> NDArray[np.bool_]:
         """Lanes that hold an element of their own, (n_blocks, LANES)."""
         return np.arange(LANES) < self.fill[:, None]
+
+
+@dataclass(frozen=True)
+class BatchRows:
+    """Where the batches of one law sum their forces.
+
+    Parameters
+    ----------
+    first_row : (n_batches + 1,) int64
+        Rows of each batch: ``first_row[b]`` to ``first_row[b + 1]`` of the force array of all laws.
+    place : (n_blocks, 8, LANES) uint16
+        Row of every corner within its batch; 0 in lanes that hold no element of their own.
+    """
+
+    first_row: NDArray[np.int64]
+    place: NDArray[np.uint16]
 
 
 @dataclass(frozen=True)
@@ -67,8 +84,12 @@ class Layout:
         Part indices of each rigid body; the driven body, if any, is the first.
     body_begin, body_end : (n_bodies,) int64
         Tied nodes of each body, counted from `n_free`.
+    batches
+        Rows of the force array by group.
+    n_rows : int
+        Rows of the force array.
     first_slot, slot : uint32
-        Compressed rows from a solver node to its places in the force buffer.
+        Compressed rows from a solver node to its rows of the force array.
     """
 
     node_order: NDArray[np.int64]
@@ -78,6 +99,8 @@ class Layout:
     body_parts: tuple[tuple[int, ...], ...]
     body_begin: NDArray[np.int64]
     body_end: NDArray[np.int64]
+    batches: tuple[BatchRows, ...]
+    n_rows: int
     first_slot: NDArray[np.uint32]
     slot: NDArray[np.uint32]
 
@@ -125,8 +148,13 @@ def arrange(problem: Problem) -> Layout:
     ordered = body_of_node[node_order[n_free:]]
     begin = np.searchsorted(ordered, np.arange(len(bodies)), "left").astype(np.int64)
     end = np.searchsorted(ordered, np.arange(len(bodies)), "right").astype(np.int64)
-    first_slot, slot = _slots(problem, groups, node_row)
-    return Layout(node_order, node_row, n_free, groups, bodies, begin, end, first_slot, slot)
+    batches, row_node = _batches(problem, groups, node_row)
+    slot = np.argsort(row_node, kind="stable")
+    first_slot = np.searchsorted(row_node[slot], np.arange(len(node_row) + 1))
+    return Layout(
+        node_order, node_row, n_free, groups, bodies, begin, end, batches, len(row_node),
+        first_slot.astype(np.uint32), slot.astype(np.uint32),
+    )  # fmt: skip
 
 
 def _bodies(problem: Problem) -> tuple[tuple[tuple[int, ...], ...], NDArray[np.int64]]:
@@ -166,7 +194,7 @@ def _bodies(problem: Problem) -> tuple[tuple[tuple[int, ...], ...], NDArray[np.i
 def _groups(problem: Problem) -> tuple[BlockGroup, ...]:
     codes = morton_codes(problem.nodes[problem.hexes].mean(axis=1))
     laws = sorted({part.material.law for part in problem.parts if not part.material.is_rigid})
-    groups, first = [], 0
+    groups = []
     for law in laws:
         rows, fill, part = [], [], []
         for k, candidate in enumerate(problem.parts):
@@ -180,22 +208,26 @@ def _groups(problem: Problem) -> tuple[BlockGroup, ...]:
                 part.append(k)
                 rows.append(np.concatenate([block, np.repeat(block[-1:], LANES - len(block))]))
         if rows:
-            groups.append(BlockGroup(law, np.array(rows), np.array(fill), np.array(part), first))
-            first += len(rows)
+            groups.append(BlockGroup(law, np.array(rows), np.array(fill), np.array(part)))
     return tuple(groups)
 
 
-def _slots(
+def _batches(
     problem: Problem, groups: tuple[BlockGroup, ...], node_row: NDArray[np.int64]
-) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    nodes, slots = [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+) -> tuple[tuple[BatchRows, ...], NDArray[np.int64]]:
+    """Rows of every batch, and the solver node of each row."""
+    batches, row_node, total = [], [np.empty(0, np.int64)], 0
     for group in groups:
-        block, lane = np.nonzero(group.filled)
-        corner = np.arange(8)
-        nodes.append(node_row[problem.hexes[group.rows[block, lane]]].ravel())
-        place = (group.first_block + block)[:, None] * (8 * LANES) + corner * LANES + lane[:, None]
-        slots.append(place.ravel())
-    node, slot = np.concatenate(nodes), np.concatenate(slots)
-    order = np.lexsort((slot, node))
-    first_slot = np.searchsorted(node[order], np.arange(len(node_row) + 1))
-    return first_slot.astype(np.uint32), slot[order].astype(np.uint32)
+        corners = node_row[problem.hexes[group.rows]].transpose(0, 2, 1)
+        place = np.zeros(corners.shape, np.uint16)
+        filled = np.broadcast_to(group.filled[:, None, :], corners.shape)
+        first_row = [total]
+        for begin in range(0, len(corners), BATCH_BLOCKS):
+            here = slice(begin, begin + BATCH_BLOCKS)
+            nodes, row = np.unique(corners[here][filled[here]], return_inverse=True)
+            place[here][filled[here]] = row
+            row_node.append(nodes)
+            total += len(nodes)
+            first_row.append(total)
+        batches.append(BatchRows(np.array(first_row), place))
+    return tuple(batches), np.concatenate(row_node)

@@ -1,8 +1,8 @@
 """From element forces to nodal motion: every node sums its elements in one fixed order.
 
-The elements leave their forces in a buffer; a node gathers them through a list of slots sorted
-by element (compressed sparse rows). No two threads write one number and no sum depends on
-who computes it, so any number of threads gives the same bits.
+Batches of elements leave the sums of their forces, a row a node they touch (`lanes`); a node gathers
+its rows through a list of slots sorted by batch (compressed sparse rows). No two threads write one number and
+no sum depends on who computes it, so any number of threads gives the same bits.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def _advance_nodes(
         Positions and velocities, updated in place.
     count : int
         Free nodes: the first `count` rows.
-    force : (n_slots, 3) float64
-        Element forces [N].
+    force : (n_rows, 3) float64
+        Sums of element forces, batch by batch [N].
     first_slot, slot : uint32
         Compressed rows: slots of node i are ``slot[first_slot[i]:first_slot[i + 1]]``.
     mass : (n,) float64
@@ -86,7 +86,7 @@ def _advance_nodes(
 
 
 def _gather_forces(force, first_slot, slot, begin, end, result):
-    """Sum the element forces of nodes `begin` to `end` into rows of `result` (n, 3) [N]."""
+    """Sum the rows of nodes `begin` to `end` into rows of `result` (n, 3) [N]."""
     for node in range(begin, end):
         for axis in range(3):
             total = 0.0

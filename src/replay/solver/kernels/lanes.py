@@ -28,6 +28,10 @@ from replay.solver.kernels.element import element, no_deformation, total_deforma
 #: Elements of a block: two AVX-512 or four AVX2 registers a value; 64 is 15 % slower.
 LANES = 16
 
+#: Blocks of a batch, whose forces one thread sums: its rows fit the fast cache, and small models still have work
+#: for every thread.
+BATCH_BLOCKS = 32
+
 #: Columns of the nodal array: one cache line a node.
 POSITION = 0
 VELOCITY = 4
@@ -126,8 +130,8 @@ else:
 
 
 def block_forces(
-    block, fill, nodal, connectivity, mass, reference, stress, hourglass, state, parameters, part, control, dt,
-    force, step, work,
+    block, fill, first_row, nodal, connectivity, place, mass, reference, stress, hourglass, state, parameters, part,
+    control, dt, force, step, work,
 ):  # fmt: skip
     """Advance the elements of one block; see `law_forces` for the arguments."""
     corner = stack(_CORNER)
@@ -171,9 +175,10 @@ def block_forces(
         store(extra, lane, LANES, (dte,))
         store(extra, LANES + lane, LANES, energy)
     for a in range(8):
-        for lane in range(LANES):
+        for lane in range(fill):
+            row = first_row + place[block, a, lane]
             for k in range(3):
-                force[block, a, lane, k] = out[(k * 8 + a) * LANES + lane]
+                force[row, k] += out[(k * 8 + a) * LANES + lane]
     for k in range(6):
         for lane in range(LANES):
             stress[block, k, lane] = out[(24 + k) * LANES + lane]
@@ -193,8 +198,8 @@ def block_forces(
 
 
 def law_forces(
-    nodal, connectivity, fill, part, mass, reference, stress, hourglass, state, parameters, control, dt,
-    force, step, work,
+    nodal, connectivity, place, first_row, fill, part, mass, reference, stress, hourglass, state, parameters, control,
+    dt, force, step, work,
 ):  # fmt: skip
     """Forces, state and stable steps of all elements of one law.
 
@@ -204,6 +209,10 @@ def law_forces(
         Positions in columns 0-2 [m], velocities in columns 4-6 [m/s].
     connectivity : (n_blocks, 8, LANES) uint32
         Node rows; lanes beyond `fill` repeat the last element of the block.
+    place : (n_blocks, 8, LANES) uint16
+        Row of every corner within its batch.
+    first_row : (n_batches + 1,) int64
+        Rows of `force` that each batch sums into.
     fill : (n_blocks,) int64
         Elements of each block.
     part : (n_blocks,) int64
@@ -220,19 +229,24 @@ def law_forces(
         Numerical controls.
     dt : float
         Length of the step that has moved the nodes [s]; zero before the first.
-    force : (n_blocks, 8, LANES, 3) float64
-        Nodal forces of each element; x, y and z side by side for the nodes to gather [N] (output).
+    force : (n_rows, 3) float64
+        Sums of each batch; x, y and z side by side for the nodes to gather [N] (output).
     step : (n_blocks, LANES) float64
         Stable steps [s], negative for an inverted element (output).
     work : (n_blocks, 3) float64
         Work of the step in stress, hourglass forces and bulk viscosity, summed over the block [J] (output).
     """
-    for index in prange(connectivity.shape[0]):
-        block = np.int64(index)  # the loop's own index is unsigned; one type, one compilation
-        run_block(
-            block, fill[block], nodal, connectivity, mass, reference, stress, hourglass, state, parameters,
-            part[block], control, dt, force, step, work,
-        )  # fmt: skip
+    batches = first_row.shape[0] - 1
+    blocks = connectivity.shape[0]
+    for index in prange(batches):
+        batch = np.int64(index)  # the loop's own index is unsigned; one type, one compilation
+        begin = first_row[batch]
+        force[begin : first_row[batch + 1]] = 0.0
+        for block in range(batch * BATCH_BLOCKS, min((batch + 1) * BATCH_BLOCKS, blocks)):
+            run_block(
+                block, fill[block], begin, nodal, connectivity, place, mass, reference, stress, hourglass, state,
+                parameters, part[block], control, dt, force, step, work,
+            )  # fmt: skip
 
 
 def specialise(template: Callable[..., Any], name: str, **names: Any) -> Callable[..., Any]:
