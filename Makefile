@@ -5,7 +5,7 @@
 #   make test              the whole test suite
 #   make quick             the suite without its slow tests
 #   make check             formatting, lint, types, spelling, workflow lint
-#   make bench             speed, as ratios to a peer in the same run
+#   make bench             speed: element cycles, roofline, peers where installed, start-up; an idle machine, please
 #   make report            the workflow's own report (needs a finished run)
 #   make lock              resolve environment.lock again from pyproject.toml (needs uv)
 #   make clean             remove results; `make distclean` also removes the environment
@@ -43,7 +43,10 @@ check: $(READY)
 	$(IN) snakemake --lint
 
 bench: $(READY)
-	$(IN) python benchmarks/element_cycles.py 32 64
+	$(IN) python benchmarks/element_cycles.py 32 64 100
+	$(IN) python benchmarks/roofline.py 64
+	$(IN) python benchmarks/peers.py 32
+	$(IN) python benchmarks/start_up.py
 
 report: $(READY)
 	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip $(CONFIG)
