@@ -121,9 +121,8 @@ def main() -> None:
         rate = best_rate(lambda count, run=run: steps(run, count), n**3)
         flops, moved = operations(run.groups[0], run.nodal), bytes_moved(run)
         roofs = machine.flops_per_s / flops / 1e6, machine.bytes_per_s / moved / 1e6
-        print(
-            f"{law:>20} {flops:7.0f} {moved:7.0f} {rate:7.2f} {roofs[0]:11.1f} {roofs[1]:8.1f} {rate / min(roofs):12.2f}"
-        )
+        share = rate / min(roofs)
+        print(f"{law:>20} {flops:7.0f} {moved:7.0f} {rate:7.2f} {roofs[0]:11.1f} {roofs[1]:8.1f} {share:12.2f}")
 
 
 if __name__ == "__main__":
