@@ -5,13 +5,17 @@ The solver takes arrays and returns arrays: a `Problem` of nodes, hexahedra, par
 of plays, heads or helmets. The physics is in `kernels`; docs/physics.md gives the equations.
 """
 
+from replay.solver.joints import Joint
 from replay.solver.kernels import source_hash
 from replay.solver.ledger import Energies
 from replay.solver.materials import LAWS, Material, law_parameters
 from replay.solver.outputs import ENERGY_TABLE, HISTORY_TABLE, PART_ENERGY_TABLE, TIME_STEP_TABLE
-from replay.solver.problem import Controls, PrescribedMotion, Problem, SolverPart, initial_velocity_about_axis
+from replay.solver.prescribed import PrescribedMotion, RigidSet
+from replay.solver.problem import Controls, Problem, SolverPart, initial_velocity_about_axis
 from replay.solver.rigid import Pose, pose_at
 from replay.solver.run import RunSummary, solve
+from replay.solver.straps import Strap
+from replay.solver.ties import Tie
 from replay.solver.view import Recorder, StateView
 
 __all__ = [
@@ -22,14 +26,18 @@ __all__ = [
     "TIME_STEP_TABLE",
     "Controls",
     "Energies",
+    "Joint",
     "Material",
     "Pose",
     "PrescribedMotion",
     "Problem",
     "Recorder",
+    "RigidSet",
     "RunSummary",
     "SolverPart",
     "StateView",
+    "Strap",
+    "Tie",
     "initial_velocity_about_axis",
     "law_parameters",
     "pose_at",

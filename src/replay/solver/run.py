@@ -22,7 +22,7 @@ from replay.errors import InstabilityError
 from replay.files import write_json
 from replay.solver.checkpoint import Checkpoints, Signals, code_hash, identity
 from replay.solver.integrator import Integrator
-from replay.solver.outputs import Histories, States
+from replay.solver.outputs import ENERGY_TABLE, Histories, States
 from replay.solver.problem import Controls, Problem
 from replay.solver.progress import Progress
 from replay.solver.threads import ThreadChoice
@@ -236,7 +236,7 @@ class _Run:
         names = [part.name for part in self.problem.parts]
         mass = np.bincount(self.problem.element_part, integrator.element_mass, len(names))
         table = self.histories.state()["energy"]
-        ratio = table[:, 12]
+        ratio = table[:, ENERGY_TABLE.names.index("ratio")]
         energies = integrator.energies(integrator.velocities())
         summary = RunSummary(
             ran_to_end=not stopped,

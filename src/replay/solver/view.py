@@ -105,11 +105,11 @@ class StateView:
         return np.einsum("eci,ecj->eij", modal, self._reference.scaled)
 
     @cached_property
-    def poses(self) -> dict[int, Pose]:
-        """Pose of the body of every rigid part by part number, read off its nodes."""
-        bodies, parts = self._integrator.bodies, self.problem.parts
-        found: dict[int, Pose] = {}
-        for body, members in enumerate(bodies.parts):
+    def body_poses(self) -> list[Pose]:
+        """Pose of every rigid body, read off its nodes."""
+        bodies = self._integrator.bodies
+        found = []
+        for body in range(bodies.count):
             rows = bodies.tied_rows(body)
             points = self._integrator.nodal[rows, POSITION : POSITION + 3]
             mass = self._integrator.mass[rows]
@@ -118,9 +118,20 @@ class StateView:
             if bodies.driven[body]:
                 told = bodies.quaternion[body]
                 quaternion = quaternion if quaternion @ told >= 0 else -quaternion
-            pose = Pose(position, quaternion, velocity, omega)
-            found |= {parts[k].pid: pose for k in members}
+            found.append(Pose(position, quaternion, velocity, omega))
         return found
+
+    @cached_property
+    def poses(self) -> dict[int, Pose]:
+        """Pose of the body of every rigid part by part number."""
+        members = zip(self.body_poses, self._integrator.bodies.parts)
+        return {self.problem.parts[k].pid: pose for pose, parts in members for k in parts}
+
+    @cached_property
+    def set_poses(self) -> dict[str, Pose]:
+        """Pose of the body of every rigid set by name."""
+        members = zip(self.body_poses, self._integrator.bodies.sets)
+        return {self.problem.rigid_sets[k].name: pose for pose, sets in members for k in sets}
 
     @cached_property
     def part_motion(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

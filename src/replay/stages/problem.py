@@ -63,13 +63,15 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Prob
         parts=parts,
         controls=controls,
         initial_velocity=driver.velocity_m_per_s[0] + np.cross(driver.omega_rad_per_s[0], arms),
-        prescribed=PrescribedMotion(
-            pids=tuple(part.pid for part in model.parts if part.role == "skull"),
-            times=driver.time_s,
-            positions=driver.position_m,
-            quaternions=driver.rotation.as_quat(),
-            velocities=driver.velocity_m_per_s,
-            angular_velocities=driver.omega_rad_per_s,
+        prescribed=(
+            PrescribedMotion(
+                pids=tuple(part.pid for part in model.parts if part.role == "skull"),
+                times=driver.time_s,
+                positions=driver.position_m,
+                quaternions=driver.rotation.as_quat(),
+                velocities=driver.velocity_m_per_s,
+                angular_velocities=driver.omega_rad_per_s,
+            ),
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
