@@ -140,8 +140,8 @@ class Integrator:
             self._body_velocity_before = self.bodies.velocity.copy()
             first, last = layout.n_free, len(self.nodal)
             gather_forces(self._force, layout.first_slot, layout.slot, first, last, self.bodies.inner)
-            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next)
-        self.runaways = int(self._sums[:, RUNAWAYS].sum())
+            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next, self.speed_limit)
+        self.runaways = int(self._sums[:, RUNAWAYS].sum() + self.bodies.sums[:, 4].sum())
         self.tied.move(self.nodal)
         linked = self.links.work(self.nodal, dt_kick) if self.links.active else None
         self.ledger.advance(self._sums, self.bodies.sums, linked)

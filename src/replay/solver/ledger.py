@@ -118,8 +118,8 @@ class Ledger:
         ----------
         chunks : (n, 4) float64
             Sums of `kernels.assembly.advance_nodes`: kinetic energy, absorbed, outside, (runaways).
-        bodies : (n, 4) float64
-            Sums of `kernels.bodies.advance_bodies`: kinetic energy, absorbed, outside, tie.
+        bodies : (n, BODY_SUMS) float64
+            Sums of `kernels.bodies.advance_bodies`: kinetic energy, absorbed, outside, tie, (runaways).
         linked
             Work taken by joint springs, joint dampers and straps (3,), and what of it was done on free nodes, where
             `chunks` has entered it as work from outside.

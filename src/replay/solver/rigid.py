@@ -179,7 +179,9 @@ class Bodies:
         )
         self.wrench[:] = 0.0
 
-    def kick(self, nodal: NDArray[np.float64], time: float, dt_kick: float, dt_drift: float) -> None:
+    def kick(
+        self, nodal: NDArray[np.float64], time: float, dt_kick: float, dt_drift: float, speed_limit: float = np.inf
+    ) -> None:
         """Bring the velocities over the present time and find the pose at ``time + dt_drift``.
 
         `inner` must hold the element forces on the tied nodes.
@@ -192,7 +194,7 @@ class Bodies:
             nodal, self._first, self._begin, self._end, self.inner, self._external, self._lever, self._node_mass,
             self.wrench, self.driven, self.mass, self.inverse_inertia, self._gravity, self.centre, self.quaternion,
             self.velocity, self.spin, self._next_centre, self._next_quaternion, self.spin_before, self.twist, dt_kick,
-            dt_drift, self.sums,
+            dt_drift, speed_limit, self.sums,
         )  # fmt: skip
 
     def drift(self) -> None:

@@ -35,6 +35,7 @@ class TiedNodes:
     def __init__(self, problem: Problem, layout: Layout) -> None:
         ties = problem.ties
         rows = [tie.nodes for tie in ties]
+        self._n_ties = len(ties)
         self._tie = np.repeat(np.arange(len(ties)), [len(r) for r in rows])
         user = np.concatenate([np.empty(0, np.int64), *rows])
         self.nodes = layout.node_row[user]
@@ -45,6 +46,7 @@ class TiedNodes:
         self._master = np.concatenate([np.empty(0, np.int64), *masters])
         self._weight = np.concatenate([np.empty(0), *weights])
         self._base = layout.n_rows
+        # what the elements take from the motion of each tied node
         self.force = np.zeros((self.count, 3))
         self.step_scale = 1.0
         carried = self.nodes >= layout.n_free
@@ -132,9 +134,7 @@ class TiedNodes:
             follow(nodal, VELOCITY, self.nodes, self._first, self._master, self._weight)
 
     def resultants(self) -> NDArray[np.float64]:
-        """Force that the masters' side exerts on the tied side, by interface (n_ties, 3) [N].
-
-        Forces of the elements count as what they take from the motion; their reaction is what crosses the interface.
-        """
-        count = int(self._tie.max()) + 1 if self.count else 0
-        return np.stack([np.bincount(self._tie, self.force[:, k], count) for k in range(3)], axis=1)
+        """Force of the tied side's elements on the masters, by interface (n_ties, 3) [N]."""
+        total = np.zeros((self._n_ties, 3))
+        np.add.at(total, self._tie, -self.force)
+        return total

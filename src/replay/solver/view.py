@@ -53,6 +53,8 @@ class StateView:
         [m], [m/s].
     energies
         The ledger.
+    links, tied
+        Joints and straps, ties: their forces at this time.
     """
 
     def __init__(self, integrator: Integrator, velocities: NDArray[np.float64], reference: ReferenceGradients) -> None:
@@ -66,6 +68,7 @@ class StateView:
         self.coordinates = integrator.user_order(integrator.nodal[:, POSITION : POSITION + 3])
         self.velocities = integrator.user_order(velocities)
         self.energies: Energies = integrator.energies(velocities)
+        self.links, self.tied = integrator.links, integrator.tied
 
     @property
     def displacements(self) -> NDArray[np.float64]:
@@ -81,6 +84,11 @@ class StateView:
     def volumes(self) -> NDArray[np.float64]:
         """Volumes (m,) [m^3]."""
         return gradients(self.coordinates, self.problem.hexes)[1]
+
+    @property
+    def reference_volumes(self) -> NDArray[np.float64]:
+        """Volumes before deformation (m,) [m^3]."""
+        return self._reference.volume
 
     @cached_property
     def von_mises(self) -> NDArray[np.float64]:

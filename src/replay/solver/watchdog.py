@@ -91,7 +91,6 @@ def check_speed(integrator: Integrator) -> None:
     velocity = integrator.nodal[:, VELOCITY : VELOCITY + 3]
     speed = np.sqrt((velocity**2).sum(axis=1))
     bad = ~(speed <= integrator.speed_limit)
-    bad[integrator.layout.n_free :] = False
     row = int(np.argmax(np.where(bad, np.where(np.isfinite(speed), speed, np.inf), 0.0)))
     user = int(integrator.layout.node_order[row])
     problem = integrator.problem

@@ -16,8 +16,9 @@ from replay.solver.kernels.device import compiled, device
 from replay.solver.kernels.lanes import POSITION, VELOCITY
 from replay.solver.kernels.tensors import add, add_scaled, apply, cross, dot, scale
 
-#: Sums over a body: kinetic energy, work absorbed by elements, work from outside, work of the rigid tie [J].
-BODY_SUMS = 4
+#: Sums over a body: kinetic energy, work absorbed by elements, work from outside, work of the rigid tie [J], nodes that
+#: are too fast.
+BODY_SUMS = 5
 _MOST_ITERATIONS = 60
 
 
@@ -74,7 +75,8 @@ turn = compiled(_turn)
 
 def _advance_bodies(
     nodal, first_tied, begin, end, inner, external, lever, node_mass, wrench, driven, mass, inverse_inertia, gravity,
-    centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, twist, dt_kick, dt_drift, sums,
+    centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, twist, dt_kick, dt_drift,
+    speed_limit, sums,
 ):  # fmt: skip
     """Kick every body, find its pose at the end of the step, and give its nodes the velocity that leads there.
 
@@ -106,7 +108,9 @@ def _advance_bodies(
         (output), of a driven one as it is told.
     dt_kick, dt_drift : float
         Mean of the steps before and after, step after [s].
-    sums : (n_bodies, 4) float64
+    speed_limit : float
+        Faster nodes, and velocities that are not numbers, are counted [m/s].
+    sums : (n_bodies, BODY_SUMS) float64
         See `BODY_SUMS` (output): kinetic energy after the kick, works of the kick.
     """
     for body in range(begin.shape[0]):
@@ -168,7 +172,9 @@ def _advance_bodies(
         loaded = 0.0
         square_before = 0.0
         square = 0.0
+        runaways = 0.0
         for k in range(begin[body], end[body]):
+            fast = 0.0
             node = first_tied + k
             place = add(c, apply(pose, _vector(lever, k)))
             for axis in range(3):
@@ -179,7 +185,10 @@ def _advance_bodies(
                 loaded += external[k, axis] * mean
                 square_before += node_mass[k] * before * before
                 square += node_mass[k] * after * after
+                fast += after * after
                 nodal[node, VELOCITY + axis] = after
+            runaways += 0.0 if fast <= speed_limit * speed_limit else 1.0
+        sums[body, 4] = runaways
         if driven[body]:
             # whoever drives the body pays for its kinetic energy and for what elements, joints and straps take
             sums[body, 0] = 0.5 * square

@@ -10,9 +10,9 @@ from replay.solver.kernels.mathx import angle
 from replay.solver.kernels.tensors import add, add_scaled, apply, cross, dot, scale, subtract
 
 #: Columns of a joint's row: rotation vector in joint axes, moment of springs and of dampers in space, force of the
-#: spring and of the damper at the centre, distance of the centres, place where the force acts.
-ANGLE, SPRING_MOMENT, DAMPER_MOMENT, SPRING_FORCE, DAMPER_FORCE, GAP, PLACE = 0, 3, 6, 9, 12, 15, 16
-JOINT_COLUMNS = 19
+#: spring and of the damper at the centre, distance of the centres, place where the force acts, moment in joint axes.
+ANGLE, SPRING_MOMENT, DAMPER_MOMENT, SPRING_FORCE, DAMPER_FORCE, GAP, PLACE, OWN_MOMENT = 0, 3, 6, 9, 12, 15, 16, 19
+JOINT_COLUMNS = 22
 
 
 @device
@@ -158,6 +158,7 @@ def _joint_forces(body, arm, axes, stiffness, damping, hold, centre, quaternion,
         slowing = apply(frame, scale(-1.0, resist))
         force = add(spring, damper)
         moment = add(turning, slowing)
+        own = apply(back, moment)
         _load(a, -1.0, place, force, moment, centre, wrench)
         _load(b, 1.0, place, force, moment, centre, wrench)
         for axis in range(3):
@@ -167,6 +168,7 @@ def _joint_forces(body, arm, axes, stiffness, damping, hold, centre, quaternion,
             row[k, SPRING_FORCE + axis] = spring[axis]
             row[k, DAMPER_FORCE + axis] = damper[axis]
             row[k, PLACE + axis] = place[axis]
+            row[k, OWN_MOMENT + axis] = own[axis]
         row[k, GAP] = math.sqrt(dot(gap, gap))
 
 
