@@ -9,9 +9,11 @@ from replay.solver.joints import Joint
 from replay.solver.kernels import source_hash
 from replay.solver.ledger import Energies
 from replay.solver.materials import LAWS, Material, law_parameters
+from replay.solver.mortar import outer_faces, tie_surfaces
 from replay.solver.outputs import ENERGY_TABLE, HISTORY_TABLE, PART_ENERGY_TABLE, TIME_STEP_TABLE
-from replay.solver.prescribed import PrescribedMotion, RigidSet
+from replay.solver.prescribed import PrescribedMotion, RigidSet, read_motion
 from replay.solver.problem import Controls, Problem, SolverPart, initial_velocity_about_axis
+from replay.solver.recorders import element_recorder, node_recorder
 from replay.solver.rigid import Pose, pose_at
 from replay.solver.run import RunSummary, solve
 from replay.solver.straps import Strap
@@ -38,9 +40,14 @@ __all__ = [
     "StateView",
     "Strap",
     "Tie",
+    "element_recorder",
     "initial_velocity_about_axis",
     "law_parameters",
+    "node_recorder",
+    "outer_faces",
     "pose_at",
+    "read_motion",
     "solve",
     "source_hash",
+    "tie_surfaces",
 ]

@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InputError
 from replay.solver.arrays import WHERE, checked_array
+from replay.tables import Column, TableFormat
+
+MOTION_TABLE = TableFormat(
+    "prescribed motion of a body",
+    (
+        Column("time_s", "time since the start of the run"),
+        *(Column(f"{axis}_m", "reference point of the body") for axis in "xyz"),
+        *(Column(f"q{axis}", "orientation, body to space, scalar last") for axis in "xyzw"),
+        *(Column(f"v{axis}_m_per_s", "velocity of that point") for axis in "xyz"),
+        *(Column(f"omega_{axis}_rad_per_s", "angular velocity in space") for axis in "xyz"),
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -131,3 +144,22 @@ class PrescribedMotion:
                 column="prescribed.times",
                 mend="shorten the run or extend the motion",
             )
+
+
+def read_motion(path: Path, pids: Sequence[int], rigid_sets: Sequence[str] = ()) -> PrescribedMotion:
+    """Motion of some rigid parts and sets from a file of `MOTION_TABLE`; more columns do no harm.
+
+    Raises
+    ------
+    InputError, InputErrors
+        For a file that lacks a column or a value.
+    """
+    frame = MOTION_TABLE.read(path)
+
+    def columns(template: str, axes: str = "xyz") -> NDArray[np.float64]:
+        return frame[[template.format(axis) for axis in axes]].to_numpy(float)
+
+    return PrescribedMotion(
+        tuple(pids), frame["time_s"].to_numpy(float), columns("{}_m"), columns("q{}", "xyzw"),
+        columns("v{}_m_per_s"), columns("omega_{}_rad_per_s"), tuple(rigid_sets),
+    )  # fmt: skip
