@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOMS = {"motion", "models", "measures", "gates", "decks", "bundle", "report"}
-LEAVES = {"documents", "errors", "files", "tables", "manifest", "play"}
+LEAVES = {"controls", "documents", "errors", "files", "tables", "manifest", "play"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cli": {"stages", "doctor", *LEAVES},
     "doctor": set(LEAVES),
@@ -21,6 +21,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "manifest": {"errors", "files"},
     "documents": {"errors", "files"},
     "play": {"documents", "errors", "files"},
+    "controls": {"documents", "play"},
 }
 VAGUE = {"utils", "util", "helpers", "helper", "misc", "common", "core"}
 

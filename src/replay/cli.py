@@ -23,7 +23,7 @@ _STAGES: dict[str, tuple[str, str]] = {
     "drive": ("drive", "resample the motion for the solver"),
     "decks": ("decks", "write Velodyne-style and LS-DYNA run decks"),
     "shake": ("shake", "1 ms of free flight of the helmet alone"),
-    "solve": ("solve", "the explicit replay"),
+    "impact": ("impact", "the explicit replay"),
     "sensitivity": ("sensitivity", "the replay at half the hourglass coefficient"),
     "fidelity": ("fidelity", "applied motion against the target"),
     "measure": ("measure", "head, brain and action measures"),
@@ -32,7 +32,7 @@ _STAGES: dict[str, tuple[str, str]] = {
     "seal": ("seal", "the sealed bundle"),
 }
 _ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
-_SOLVING = ("shake", "solve", "sensitivity")
+_SOLVING = ("shake", "impact", "sensitivity")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -89,6 +89,19 @@ def _parser() -> argparse.ArgumentParser:
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
 
+    solve = commands.add_parser(
+        "solve",
+        help="run any model of hexahedra under its own controls",
+        description="The solver as a tool of its own (docs/solver.md). After Ctrl-C the same command goes on.",
+    )
+    solve.add_argument("model", type=Path, metavar="MODEL", help="model.h5, or an LS-DYNA keyword file in SI units")
+    solve.add_argument("--controls", type=Path, required=True, metavar="controls.yaml")
+    solve.add_argument(
+        "--out", type=Path, metavar="FOLDER", help="folder of the results (default: <name of the model>-run)"
+    )
+    solve.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
+    solve.add_argument("--anew", action="store_true", help="start from time 0 even where a checkpoint lies")
+
     commands.add_parser("doctor", help="check this machine and environment")
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
     schema.add_argument("--out", type=Path, help="write it to a file instead")
@@ -129,7 +142,7 @@ def _run_stage(arguments: argparse.Namespace) -> int:
 
 
 def _run_tool(arguments: argparse.Namespace) -> int:
-    from replay.stages import tools
+    from replay.stages import explicit, tools
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
@@ -138,6 +151,13 @@ def _run_tool(arguments: argparse.Namespace) -> int:
         "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview
+        ),
+        "solve": lambda: explicit.solve_model(
+            arguments.model,
+            arguments.controls,
+            arguments.out or Path(f"{arguments.model.stem}-run"),
+            threads=arguments.threads,
+            anew=arguments.anew,
         ),
         "schema": lambda: tools.write_schema(arguments.out),
     }

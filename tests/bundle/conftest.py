@@ -86,7 +86,7 @@ def fabricate(folder: Path, *, rejected: bool = False, shift: float = 0.0, log: 
         (results / "replay" / "checkpoint").mkdir()
         (results / "replay" / "checkpoint" / "000100.h5").write_bytes(b"x" * 1000)
     (results / "logs").mkdir()
-    (results / "logs" / "solve.log").write_text(str(folder))
+    (results / "logs" / "impact.log").write_text(str(folder))
     status = "rejected" if rejected else "accepted"
     verdict = {"play": "demo", "status": status, "line": f"demo: {status}"}
     _stage(results, "verdict", {"verdict.json": json.dumps(verdict).encode()}, inputs=("shake/gate.json",))
@@ -100,7 +100,7 @@ def fabricate_source(root: Path) -> Path:
         "environment.lock": "numpy==2.0.0\n",
         "CITATION.cff": "cff-version: 1.2.0\n",
         "config/config.yaml": "plays: [demo]\n",
-        "workflow/rules/replay.smk": "rule solve:\n    shell: 'replay solve'\n",
+        "workflow/rules/replay.smk": "rule impact:\n    shell: 'replay impact'\n",
         "src/replay/__init__.py": '__version__ = "0.1.0"\n',
     }
     for name, text in files.items():

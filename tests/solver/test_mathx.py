@@ -1,4 +1,4 @@
-"""The kernels' exponential and logarithm against 50 digits."""
+"""The kernels' exponential, logarithm and angle against 50 digits."""
 
 from __future__ import annotations
 
@@ -35,3 +35,14 @@ def test_exponential_stays_finite_beyond_its_range() -> None:
     assert mathx.exp(1e6) == pytest.approx(math.exp(709.0), rel=1e-12)
     assert 0.0 < mathx.exp(-1e6) < 1e-300
     assert mathx.exp(0.0) == 1.0
+
+
+@pytest.mark.parametrize("low", [1e-12, 1e-3, 0.5])
+def test_angle_is_right_to_five_ulps_over_a_quarter_turn(low: float) -> None:
+    mpmath.mp.dps = 50
+    for a in np.linspace(low, np.pi / 2, 200):
+        x, y = mpmath.cos(mpmath.mpf(float(a))), mpmath.sin(mpmath.mpf(float(a)))
+        sine, cosine = float(y), max(float(x), 0.0)
+        exact = mpmath.atan2(mpmath.mpf(sine), mpmath.mpf(cosine))
+        assert ulps(mathx.angle(sine, cosine), exact) < 5.0
+    assert mathx.angle(0.0, 1.0) == 0.0

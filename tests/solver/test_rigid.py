@@ -164,7 +164,7 @@ def test_free_body_with_soft_parts_keeps_momentum_angular_momentum_and_energy() 
         run.kick(dt, drift=False)
         energies = run.energies()
         assert abs(energies.closure) < 1e-12
-        tie = max(tie, abs(energies.joint))
+        tie = max(tie, abs(energies.tie))
         run.drift(dt, run.time_s + dt)
     drift = np.abs(momenta() - start)
     assert drift[:3].max() < 1e-12 * np.abs(start[:3]).max()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -18,12 +19,26 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from linked import everything
+from scipy.spatial.transform import Rotation
 
 import replay.solver.run as run_module
-from replay.errors import ResumeError
-from replay.solver import ENERGY_TABLE, HISTORY_TABLE, PART_ENERGY_TABLE, TIME_STEP_TABLE, Controls, Problem, solve
+from replay.errors import ReplayError, ResumeError
+from replay.solver import (
+    ENERGY_TABLE,
+    HISTORY_TABLE,
+    PART_ENERGY_TABLE,
+    TIME_STEP_TABLE,
+    Controls,
+    Problem,
+    RunSummary,
+    solve,
+)
 from replay.solver.checkpoint import Checkpoints, identity
 from replay.solver.integrator import Integrator
+from replay.solver.link_histories import JOINT_TABLE, RIGID_SET_TABLE, STRAP_TABLE, TIE_TABLE
+from replay.solver.outputs import States
+from replay.solver.recorders import ELEMENT_TABLE, NODE_TABLE, element_recorder, node_recorder
 from replay.solver.vtkhdf import read_states
 
 Layered = Callable[..., Problem]
@@ -114,21 +129,125 @@ def test_a_stopped_run_resumes_bit_identical_at_any_step(
     whole = solve(problem, tmp_path / "whole", recorders=[Tip()], progress=None)
     assert whole.steps > 205
 
-    class StopAt(run_module.Signals):
-        count = 0
-
-        def take(self) -> signal.Signals | None:
-            StopAt.count += 1
-            return signal.SIGTERM if StopAt.count == stop_at else None
-
     with monkeypatch.context() as patch:
-        patch.setattr(run_module, "Signals", StopAt)
+        patch.setattr(run_module, "Signals", stopping(stop_at))
         with pytest.raises(SystemExit):
             solve(problem, tmp_path / "halves", recorders=[Tip()], progress=None)
     assert (tmp_path / "halves" / "checkpoint").is_dir()
     again = solve(problem, tmp_path / "halves", recorders=[Tip()], progress=None)
     assert again.state_hash == whole.state_hash
     assert hashes(tmp_path / "halves") == hashes(tmp_path / "whole")
+
+
+@pytest.mark.parametrize("stop_at", sorted(np.random.default_rng(20261125).integers(2, 200, 6).tolist()))
+def test_a_run_with_joints_straps_and_ties_resumes_bit_identical_at_any_step(
+    linked_run: tuple[RunSummary, Path], tmp_path: Path, stop_at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, folder = linked_run
+    assert whole.steps >= 200
+    problem = everything()
+    with monkeypatch.context() as patch:
+        patch.setattr(run_module, "Signals", stopping(stop_at))
+        with pytest.raises(SystemExit):
+            solve(problem, tmp_path, recorders=chosen(problem), progress=None)
+    again = solve(problem, tmp_path, recorders=chosen(problem), progress=None)
+    assert again.state_hash == whole.state_hash
+    assert hashes(tmp_path) == hashes(folder)
+
+
+def test_the_ledger_of_a_linked_run_closes_with_every_column_at_work(linked_run: tuple[RunSummary, Path]) -> None:
+    energy = ENERGY_TABLE.read(linked_run[1] / "energy.csv")
+    assert np.abs(energy["closure"]).max() < 1e-10
+    last = energy.iloc[-1]
+    for column in ("internal_J", "joint_spring_J", "joint_damper_J", "strap_J", "external_work_J"):
+        assert abs(last[column]) > 1e-6 * last["kinetic_J"], column
+    assert abs(last["tie_J"]) < 1e-6 * last["kinetic_J"]
+    assert energy["ratio"].between(0.98, 1.02).all()
+
+
+def test_histories_of_links_say_what_the_links_did(linked_run: tuple[RunSummary, Path]) -> None:
+    folder = linked_run[1]
+    joints, straps = JOINT_TABLE.read(folder / "joints.csv"), STRAP_TABLE.read(folder / "straps.csv")
+    times = np.linspace(0.0, 4e-3, 11)
+    for table in (joints, straps, TIE_TABLE.read(folder / "ties.csv")):
+        assert np.allclose(table["time_s"], times, rtol=1e-12)
+    angle, moment = joints["angle_y_rad"], joints["moment_y_N_m"]
+    assert angle.abs().max() > 1e-3
+    assert moment.abs().max() > 0.2 * 0.3 * angle.abs().max()
+    stretch = straps["length_m"] - straps["natural_length_m"]
+    assert (straps["tension_N"][stretch <= 0] == 0).all()
+    assert straps["natural_length_m"].iloc[0] - straps["natural_length_m"].iloc[-1] == pytest.approx(5e-4, rel=1e-12)
+    sets = RIGID_SET_TABLE.read(folder / "rigid_sets.csv")
+    assert sets["rigid_set"].tolist() == ["foot", "head"] * 11
+    # the neck's angle is the turn between its bodies
+    foot, head = (sets[sets["rigid_set"] == name] for name in ("foot", "head"))
+    turn = Rotation.from_quat(foot[["qx", "qy", "qz", "qw"]]).inv() * Rotation.from_quat(head[["qx", "qy", "qz", "qw"]])
+    assert np.abs(turn.as_rotvec() - joints[["angle_x_rad", "angle_y_rad", "angle_z_rad"]]).to_numpy().max() < 1e-9
+
+
+def test_nodes_and_elements_that_were_asked_for_have_histories(linked_run: tuple[RunSummary, Path]) -> None:
+    problem, folder = everything(), linked_run[1]
+    nodes, elements = (
+        NODE_TABLE.read(folder / "node_histories.csv"),
+        ELEMENT_TABLE.read(folder / "element_histories.csv"),
+    )
+    assert nodes["node_id"].tolist() == [3, 40] * 11
+    assert np.array_equal(nodes[nodes["node_id"] == 40][["x_m", "y_m", "z_m"]].iloc[0], problem.nodes[39])
+    assert elements["element_id"].tolist() == [5] * 11
+    assert (elements["volume_ratio"].iloc[0], elements["stress_xx_Pa"].iloc[0]) == (1.0, 0.0)
+    assert (
+        np.abs(elements["pressure_Pa"] + elements[["stress_xx_Pa", "stress_yy_Pa", "stress_zz_Pa"]].mean(axis=1)).max()
+        < 1e-9
+    )
+
+
+@pytest.fixture(scope="module")
+def linked_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunSummary, Path]:
+    """A run with joints, straps and ties, and its folder."""
+    folder, problem = tmp_path_factory.mktemp("linked"), everything()
+    return solve(problem, folder, recorders=chosen(problem), progress=None), folder
+
+
+def chosen(problem: Problem) -> list[Any]:
+    return [node_recorder(problem, np.array([2, 39])), element_recorder(problem, np.array([4]))]
+
+
+def stopping(at: int) -> type:
+    """Signals of which SIGTERM comes after some step."""
+
+    class StopAt(run_module.Signals):
+        count = 0
+
+        def take(self) -> signal.Signals | None:
+            StopAt.count += 1
+            return signal.SIGTERM if StopAt.count == at else None
+
+    return StopAt
+
+
+def test_two_threads_pull_at_joints_straps_and_ties_alike(linked_run: tuple[RunSummary, Path], tmp_path: Path) -> None:
+    problem = everything()
+    solve(problem, tmp_path, recorders=chosen(problem), threads=2, progress=None)
+    assert hashes(tmp_path) == hashes(linked_run[1])
+
+
+def test_a_full_disk_is_one_message_and_costs_no_earlier_checkpoint(
+    layered: Layered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = layered(end=1e-3)
+    store = Checkpoints(tmp_path, identity(problem))
+    store.write(1, {"a": np.ones(5)})
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(ReplayError, match=r"cannot be written \(No space left on device\)\n.*free disk space"):
+        store.write(2, {"a": np.ones(5)})
+    with pytest.raises(ReplayError, match=r"states.partial: cannot be written \(No space left on device\)"):
+        States(problem, tmp_path, np.ones(len(problem.hexes)), resume_at=None).sync()
+    assert [p.name for p in tmp_path.glob("*.checkpoint")] == ["step-000000000001.checkpoint"]
+    assert not list(tmp_path.glob(".step*"))
 
 
 _CHILD = """
@@ -221,6 +340,7 @@ def test_a_damaged_checkpoint_falls_back_to_the_one_before(layered: Layered, tmp
     files[1].write_bytes(raw)
     found = store.read()
     assert found is not None
+    assert store.damaged == [files[1]]
     assert found["a"].tolist() == [2.0] * 5
     files[0].write_bytes(b"half a fi")
     with pytest.raises(ResumeError, match="no checkpoint is whole"):

@@ -50,6 +50,15 @@ def test_a_runaway_node_stops_the_run_and_the_last_good_state_is_there(tmp_path:
         assert len(states) >= 1
 
 
+def test_a_rigid_body_that_runs_away_stops_the_run_with_its_part(tmp_path: Path) -> None:
+    nodes, hexes = structured_block((2, 2, 2), (0.02, 0.02, 0.02))
+    bone = SolverPart(7, "skull", Material("bone", "rigid", 1000.0, {}))
+    problem = Problem(nodes, hexes, np.zeros(8, int), (bone,), Controls(1e-2, speed_limit_m_per_s=5.0),
+                      nodal_forces=np.full((27, 3), 10.0))  # fmt: skip
+    with pytest.raises(InstabilityError, match=r"node 1 of part 7 \(skull\).*runs away 5\.\d+ m/s"):
+        solve(problem, tmp_path, progress=None)
+
+
 def test_a_value_that_is_no_number_stops_the_run_within_one_step(tmp_path: Path) -> None:
     class Poison:
         def sample(self, view) -> None:

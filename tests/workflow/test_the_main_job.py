@@ -22,7 +22,7 @@ STAGES = (
     "assemble",
     "shake",
     "decks",
-    "solve",
+    "impact",
     "sensitivity",
     "fidelity",
     "measure",
@@ -68,7 +68,7 @@ def test_an_edited_click_reruns_from_the_reconstruction_on(copied: Checkout) -> 
     lines[1] = re.sub(r"(\d)$", lambda m: str((int(m[1]) + 1) % 10), lines[1])
     clicks.write_text("\n".join(lines) + "\n")
     planned = set(copied.planned("demo"))
-    assert {"inputs", "reconstruct", "drive", "solve", "report", "seal"} <= planned
+    assert {"inputs", "reconstruct", "drive", "impact", "report", "seal"} <= planned
     assert not {"settings", "assemble", "shake"} & planned
 
 
@@ -76,7 +76,7 @@ def test_an_edited_solver_source_reruns_from_the_shake_on(copied: Checkout) -> N
     source = copied.root / "src/replay/solver/run.py"
     source.write_text(source.read_text() + "# edited\n")
     planned = set(copied.planned("demo"))
-    assert {"shake", "solve", "sensitivity", "seal"} <= planned
+    assert {"shake", "impact", "sensitivity", "seal"} <= planned
     assert not {"settings", "inputs", "reconstruct", "assemble"} & planned
 
 
@@ -125,7 +125,7 @@ def test_a_killed_run_goes_on_from_its_checkpoint_to_the_same_bytes(copied: Chec
     replay = copied.root / "results/demo/replay"
     for path in sorted(replay.rglob("*"), reverse=True):
         path.unlink() if path.is_file() else path.rmdir()
-    run = copied.start("replay", "solve", "demo", "--threads", "2", "--checkpoint-every", "0.5")
+    run = copied.start("replay", "impact", "demo", "--threads", "2", "--checkpoint-every", "0.5")
     deadline = time.monotonic() + 300
     while not list(replay.glob("checkpoint/*")) and run.poll() is None and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -133,7 +133,7 @@ def test_a_killed_run_goes_on_from_its_checkpoint_to_the_same_bytes(copied: Chec
     os.killpg(run.pid, signal.SIGKILL)
     run.wait()
     assert not (replay / "manifest.json").exists()
-    output = copied.run("replay", "solve", "demo", "--threads", "1")
+    output = copied.run("replay", "impact", "demo", "--threads", "1")
     assert "goes on from" in output
     for name in ("states.vtkhdf", "energy.csv", "histories.csv", "manifest.json"):
         assert (replay / name).read_bytes() == (finished.root / "results/demo/replay" / name).read_bytes(), name
@@ -154,7 +154,7 @@ def test_a_second_run_in_the_same_folder_is_refused(copied: Checkout) -> None:
 def test_a_file_changed_behind_the_manifest_is_refused(copied: Checkout) -> None:
     driver = copied.root / "results/demo/driver/driver_6dof.csv"
     driver.write_text(driver.read_text().replace("0.", "0.0", 1))
-    output = copied.run("replay", "solve", "demo", expect=2)
+    output = copied.run("replay", "impact", "demo", expect=2)
     assert "driver_6dof.csv" in output
     assert "replay drive" in output
     assert "Traceback" not in output

@@ -1,14 +1,14 @@
 # The explicit replay, its sensitivity to hourglass control, and what was measured on it.
 
 
-rule solve:
+rule impact:
     input:
         settings=stage("settings"),
         assembly=stage("assembly"),
         driver=stage("driver"),
         shake=stage("shake"),
         code=code(
-            "stages/solve.py",
+            "stages/impact.py",
             "stages/frame.py",
             "stages/problem.py",
             "models",
@@ -19,9 +19,9 @@ rule solve:
     output:
         stage("replay"),
     log:
-        log("solve"),
+        log("impact"),
     benchmark:
-        "results/{play}/logs/solve.benchmark.tsv"
+        "results/{play}/logs/impact.benchmark.tsv"
     threads: workflow.cores
     resources:
         mem_mb=8000,
@@ -29,7 +29,7 @@ rule solve:
     message:
         "{wildcards.play}: replay the impact"
     shell:
-        "replay solve {wildcards.play} --threads {threads} --carry-on 2>&1 | tee {log}"
+        "replay impact {wildcards.play} --threads {threads} --carry-on 2>&1 | tee {log}"
 
 
 rule sensitivity:

@@ -5,13 +5,19 @@ The solver takes arrays and returns arrays: a `Problem` of nodes, hexahedra, par
 of plays, heads or helmets. The physics is in `kernels`; docs/physics.md gives the equations.
 """
 
+from replay.solver.joints import Joint
 from replay.solver.kernels import source_hash
 from replay.solver.ledger import Energies
 from replay.solver.materials import LAWS, Material, law_parameters
+from replay.solver.mortar import outer_faces, tie_surfaces
 from replay.solver.outputs import ENERGY_TABLE, HISTORY_TABLE, PART_ENERGY_TABLE, TIME_STEP_TABLE
-from replay.solver.problem import Controls, PrescribedMotion, Problem, SolverPart, initial_velocity_about_axis
+from replay.solver.prescribed import PrescribedMotion, RigidSet, read_motion
+from replay.solver.problem import Controls, Problem, SolverPart, initial_velocity_about_axis
+from replay.solver.recorders import element_recorder, node_recorder
 from replay.solver.rigid import Pose, pose_at
 from replay.solver.run import RunSummary, solve
+from replay.solver.straps import Strap
+from replay.solver.ties import Tie
 from replay.solver.view import Recorder, StateView
 
 __all__ = [
@@ -22,17 +28,26 @@ __all__ = [
     "TIME_STEP_TABLE",
     "Controls",
     "Energies",
+    "Joint",
     "Material",
     "Pose",
     "PrescribedMotion",
     "Problem",
     "Recorder",
+    "RigidSet",
     "RunSummary",
     "SolverPart",
     "StateView",
+    "Strap",
+    "Tie",
+    "element_recorder",
     "initial_velocity_about_axis",
     "law_parameters",
+    "node_recorder",
+    "outer_faces",
     "pose_at",
+    "read_motion",
     "solve",
     "source_hash",
+    "tie_surfaces",
 ]

@@ -60,6 +60,7 @@ class Checkpoints:
     def __init__(self, folder: Path, run: Mapping[str, str]) -> None:
         self.folder = folder
         self._run = dict(run)
+        self.damaged: list[Path] = []
 
     def write(self, step: int, arrays: Mapping[str, NDArray[Any]]) -> Path:
         """Write a checkpoint and drop all but the last two."""
@@ -83,7 +84,7 @@ class Checkpoints:
         return sorted(self.folder.glob(_PATTERN))
 
     def read(self) -> dict[str, NDArray[Any]] | None:
-        """Arrays of the last whole checkpoint, or None where there is no file.
+        """Arrays of the last whole checkpoint, or None where there is no file; `damaged` lists those passed over.
 
         Raises
         ------
@@ -94,6 +95,7 @@ class Checkpoints:
         for path in reversed(files):
             found = _read_whole(path)
             if found is None:
+                self.damaged.append(path)
                 continue
             header, arrays = found
             self._refuse_stranger(path, header["run"])

@@ -6,8 +6,8 @@ Positions and stresses live at times t_n, velocities half a step before or after
     kick        v(n+1/2) = v(n-1/2) + (dt_before + dt_after)/2 M^-1 f(t_n)
     drift       x(n+1) = x(n) + dt_after v(n+1/2)
 
-and the first kick takes half a step, so that the given velocities hold at time 0. Joints and
-contact have their place between forces and kick, and between kick and drift.
+and the first kick takes half a step, so that the given velocities hold at time 0. Joints and straps pull
+with the forces, tied nodes hand theirs over before the kick; contact has its place between kick and drift.
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from replay.solver.kernels.assembly import CHUNK, RUNAWAYS, advance_nodes, drift
 from replay.solver.kernels.lanes import NODE_COLUMNS, POSITION, VELOCITY
 from replay.solver.layout import Layout, arrange
 from replay.solver.ledger import Energies, Ledger
+from replay.solver.links import Links
 from replay.solver.problem import Problem, gradients
 from replay.solver.rigid import Bodies
+from replay.solver.tied_nodes import TiedNodes
 from replay.solver.time_step import AddedMass, StepBound, scale_masses, smallest_step
 
 
@@ -45,7 +47,9 @@ class Integrator:
 
     def __init__(self, problem: Problem, speed_limit_m_per_s: float) -> None:
         self.problem = problem
-        self.layout: Layout = arrange(problem)
+        plain = arrange(problem)
+        self.tied = TiedNodes(problem, plain)
+        self.layout: Layout = self.tied.rearrange(plain)
         n, order = len(problem.nodes), self.layout.node_order
         self.nodal = _aligned(n)
         self.nodal[:, POSITION : POSITION + 3] = problem.nodes[order]
@@ -54,8 +58,10 @@ class Integrator:
         self.groups = [ElementGroup(problem, self.layout, k, self._force) for k in range(len(self.layout.groups))]
         self.added_mass: AddedMass = scale_masses(problem, self.groups, self.nodal)
         self._lump()
-        self.bodies = Bodies(problem, self.layout, self.mass, self._soft_mass)
+        self.bodies = Bodies(problem, self.layout, self.mass, self._soft_mass, self._loads)
         self.bodies.start(self.nodal)
+        self.tied.move(self.nodal)
+        self.links = Links(problem, self.layout, self.bodies, self.mass)
         self.speed_limit = speed_limit_m_per_s
         self._sums = np.zeros(((self.layout.n_free + CHUNK - 1) // CHUNK, 4))
         free = self.nodal[: self.layout.n_free, VELOCITY : VELOCITY + 3]
@@ -83,16 +89,27 @@ class Integrator:
         self.mass = _nodal_share(element_mass, problem, layout)
         self._soft_mass = soft
         self._added_mass = _nodal_share(self.element_added_mass, problem, layout)
+        self.tied.share_masses(self.mass, soft, self._added_mass)
         order = layout.node_order
-        self._inverse_mass = np.where(problem.fixed[order], 0.0, 1.0 / self.mass[:, None])
+        still = problem.fixed[order] | (self.mass == 0)[:, None]
+        self._inverse_mass = np.where(still, 0.0, 1.0 / np.where(still, 1.0, self.mass[:, None]))
         gravity = np.asarray(problem.controls.gravity_m_per_s2, float)
-        self._external = problem.nodal_forces[order] + self.mass[:, None] * gravity
+        self._loads = self.tied.share_loads(problem.nodal_forces[order])
+        self._external = self._loads + self.mass[:, None] * gravity
+        self._steady = self._external.copy()
 
     def forces(self) -> StepBound:
         """Bring all elements to the present time; return the smallest stable step."""
         for group in self.groups:
             group.forces(self.nodal, self.dt_s)
-        return smallest_step(self.groups, self.ledger.part_work)
+        self.tied.share(self._force)
+        bound = smallest_step(self.groups, self.ledger.part_work)
+        step = bound.step_s * self.tied.step_scale
+        if self.links.active:
+            self._external[self.links.touched] = self._steady[self.links.touched]
+            self.links.forces(self.nodal, self._external, self.time_s)
+            step = self.links.limited(step)
+        return StepBound(step, bound.element)
 
     def inner_forces(self) -> NDArray[np.float64]:
         """Sums of the element forces at the nodes, after `forces`, in the user's order (n, 3) [N]."""
@@ -113,6 +130,8 @@ class Integrator:
         layout = self.layout
         dt_kick = 0.5 * (self.dt_s + dt_next)
         self._drifted = drift
+        if self.links.active:
+            self.links.before_kick(self.nodal)
         advance_nodes(
             self.nodal, layout.n_free, self._force, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
             self._external, dt_kick, dt_next if drift else 0.0, self.speed_limit, self._sums,
@@ -121,14 +140,18 @@ class Integrator:
             self._body_velocity_before = self.bodies.velocity.copy()
             first, last = layout.n_free, len(self.nodal)
             gather_forces(self._force, layout.first_slot, layout.slot, first, last, self.bodies.inner)
-            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next)
-        self.runaways = int(self._sums[:, RUNAWAYS].sum())
-        self.ledger.advance(self._sums, self.bodies.sums)
+            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next, self.speed_limit)
+        self.runaways = int(self._sums[:, RUNAWAYS].sum() + self.bodies.sums[:, 4].sum())
+        self.tied.move(self.nodal)
+        linked = self.links.work(self.nodal, dt_kick) if self.links.active else None
+        self.ledger.advance(self._sums, self.bodies.sums, linked)
 
     def drift(self, dt_next: float, time_next: float) -> None:
         """Move everything to the end of the step."""
         first = self.layout.n_free if self._drifted else 0
         drift_nodes(self.nodal, first, len(self.nodal), dt_next)
+        self.tied.move(self.nodal)
+        self.tied.place(self.nodal)
         if self.bodies.count:
             self.bodies.drift()
         self.time_s, self.dt_s = time_next, dt_next

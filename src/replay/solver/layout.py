@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InputError
+from replay.solver.arrays import WHERE
 from replay.solver.kernels.lanes import BATCH_BLOCKS, LANES
-from replay.solver.problem import WHERE, Problem
+from replay.solver.problem import Problem
 
 _MORTON_BITS = 20
 
@@ -80,8 +81,9 @@ class Layout:
         Nodes that no body carries: the first rows.
     groups
         Deformable elements by law.
-    body_parts
-        Part indices of each rigid body; the driven body, if any, is the first.
+    body_parts, body_sets
+        Part indices and rigid set indices of each rigid body; the driven bodies are the first, in the order of
+        their motions.
     body_begin, body_end : (n_bodies,) int64
         Tied nodes of each body, counted from `n_free`.
     batches
@@ -97,12 +99,20 @@ class Layout:
     n_free: int
     groups: tuple[BlockGroup, ...]
     body_parts: tuple[tuple[int, ...], ...]
+    body_sets: tuple[tuple[int, ...], ...]
     body_begin: NDArray[np.int64]
     body_end: NDArray[np.int64]
     batches: tuple[BatchRows, ...]
     n_rows: int
     first_slot: NDArray[np.uint32]
     slot: NDArray[np.uint32]
+
+    def body_named(self, problem: Problem, name: int | str) -> int:
+        """Number of the body that a part number or the name of a rigid set stands for."""
+        for body, (parts, sets) in enumerate(zip(self.body_parts, self.body_sets)):
+            if name in [problem.parts[k].pid for k in parts] or name in [problem.rigid_sets[k].name for k in sets]:
+                return body
+        raise InputError(WHERE, f"rigid part {name} has no elements", column="parts", mend="remove what names it")
 
     @property
     def n_blocks(self) -> int:
@@ -127,9 +137,10 @@ def arrange(problem: Problem) -> Layout:
     Raises
     ------
     InputError
-        When a held node belongs to a rigid body, whose motion is not free to hold.
+        When a held node belongs to a rigid body, whose motion is not free to hold; when two motions drive one body.
     """
-    bodies, body_of_node = _bodies(problem)
+    members, body_of_node = _bodies(problem)
+    bodies = len(members)
     tied = body_of_node >= 0
     held = tied & problem.fixed.any(axis=1)
     if held.any():
@@ -146,20 +157,32 @@ def arrange(problem: Problem) -> Layout:
     node_row[node_order] = np.arange(len(node_order))
     n_free = int((~tied).sum())
     ordered = body_of_node[node_order[n_free:]]
-    begin = np.searchsorted(ordered, np.arange(len(bodies)), "left").astype(np.int64)
-    end = np.searchsorted(ordered, np.arange(len(bodies)), "right").astype(np.int64)
+    begin = np.searchsorted(ordered, np.arange(bodies), "left").astype(np.int64)
+    end = np.searchsorted(ordered, np.arange(bodies), "right").astype(np.int64)
     batches, row_node = _batches(problem, groups, node_row)
     slot = np.argsort(row_node, kind="stable")
     first_slot = np.searchsorted(row_node[slot], np.arange(len(node_row) + 1))
+    n_parts = len(problem.parts)
+    parts = tuple(tuple(k for k in keys if k < n_parts) for keys in members)
+    sets = tuple(tuple(k - n_parts for k in keys if k >= n_parts) for keys in members)
     return Layout(
-        node_order, node_row, n_free, groups, bodies, begin, end, batches, len(row_node),
+        node_order, node_row, n_free, groups, parts, sets, begin, end, batches, len(row_node),
         first_slot.astype(np.uint32), slot.astype(np.uint32),
     )  # fmt: skip
 
 
-def _bodies(problem: Problem) -> tuple[tuple[tuple[int, ...], ...], NDArray[np.int64]]:
-    """Join rigid parts that share nodes or are driven together; number the bodies, the driven one first."""
-    rigid = [k for k, part in enumerate(problem.parts) if part.material.is_rigid]
+def _bodies(problem: Problem) -> tuple[list[list[int]], NDArray[np.int64]]:
+    """Join rigid parts and sets that share nodes or are driven together; number the bodies, driven ones first.
+
+    A key below the number of parts is a part, one above it a rigid set.
+    """
+    n_parts = len(problem.parts)
+    nodes_of = {
+        k: np.unique(problem.hexes[problem.element_part == k])
+        for k, part in enumerate(problem.parts)
+        if part.material.is_rigid
+    } | {n_parts + k: np.sort(rigid_set.nodes) for k, rigid_set in enumerate(problem.rigid_sets)}
+    rigid = [k for k in nodes_of if len(nodes_of[k])]
     root = {k: k for k in rigid}
 
     def find(k: int) -> int:
@@ -171,24 +194,42 @@ def _bodies(problem: Problem) -> tuple[tuple[tuple[int, ...], ...], NDArray[np.i
         a, b = find(a), find(b)
         root[max(a, b)] = min(a, b)
 
-    nodes_of = {k: np.unique(problem.hexes[problem.element_part == k]) for k in rigid}
-    rigid = [k for k in rigid if len(nodes_of[k])]
     owner = np.full(len(problem.nodes), -1)
     for k in rigid:
         for other in np.unique(owner[nodes_of[k]]):
             if other >= 0:
                 join(int(other), k)
         owner[nodes_of[k]] = k
-    driven = [k for k in rigid if problem.prescribed and problem.parts[k].pid in problem.prescribed.pids]
-    for k in driven[1:]:
-        join(driven[0], k)
-    leaders = sorted({find(k) for k in rigid}, key=lambda k: (not (driven and find(driven[0]) == k), k))
-    bodies = tuple(tuple(k for k in rigid if find(k) == leader) for leader in leaders)
+    driven = [_driven_keys(problem, number, rigid) for number in range(len(problem.prescribed))]
+    for keys in driven:
+        for k in keys[1:]:
+            join(keys[0], k)
+    motion_of: dict[int, int] = {}
+    for number, keys in enumerate(driven):
+        for leader in {find(k) for k in keys}:
+            if leader in motion_of:
+                raise InputError(
+                    WHERE, f"motions {motion_of[leader] + 1} and {number + 1} drive one body", column="prescribed",
+                    expected="one motion for a body", mend="parts that share nodes are one body",
+                )  # fmt: skip
+            motion_of[leader] = number
+    leaders = sorted({find(k) for k in rigid}, key=lambda k: (motion_of.get(k, len(driven)), k))
+    members = [[k for k in rigid if find(k) == leader] for leader in leaders]
     body_of_node = np.full(len(problem.nodes), -1)
-    for number, parts in enumerate(bodies):
-        for k in parts:
+    for number, keys in enumerate(members):
+        for k in keys:
             body_of_node[nodes_of[k]] = number
-    return bodies, body_of_node
+    return members, body_of_node
+
+
+def _driven_keys(problem: Problem, number: int, rigid: list[int]) -> list[int]:
+    motion = problem.prescribed[number]
+    keys = [k for k, part in enumerate(problem.parts) if part.pid in motion.pids]
+    keys += [len(problem.parts) + k for k, s in enumerate(problem.rigid_sets) if s.name in motion.rigid_sets]
+    found = [k for k in keys if k in rigid]
+    if not found:
+        raise InputError(WHERE, f"motion {number + 1} drives parts without elements", column="prescribed.pids")
+    return found
 
 
 def _groups(problem: Problem) -> tuple[BlockGroup, ...]:

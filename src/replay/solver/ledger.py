@@ -3,7 +3,7 @@
 Central differences change the kinetic energy of a step by exactly the forces' work with the mean
 of the velocities before and after, so
 
-    kinetic + (work absorbed by elements) + joints - (work from outside) = kinetic at time 0
+    kinetic + (work absorbed by elements) + joints + straps + ties - (work from outside) = kinetic at time 0
 
 holds to rounding at every half step: that is `closure`, an identity of the arithmetic, which a lost
 force, a wrong mass or a damaged restart would break. What the elements absorb is also summed
@@ -34,8 +34,14 @@ class Energies:
         Work of the stresses at mid-step rates [J].
     hourglass, bulk_viscosity
         Work of the hourglass forces, of the bulk viscosity [J].
-    contact_normal, friction, joint
-        Work lost in contact and friction; work of joints, among them the rounding of rigid ties [J].
+    contact_normal, friction
+        Work lost in contact and friction [J].
+    joint_spring, joint_damper
+        Work taken by the springs of joints (what they store) and by their dampers (what they lose) [J].
+    strap
+        Work taken by straps: stored, lost in their damping, less what paying in brings [J].
+    tie
+        Work taken by rigid and tied nodes, whose constraints should take none: rounding [J].
     external_work
         Work of drivers, supports, loads and weight [J].
     added_mass_kinetic
@@ -52,7 +58,10 @@ class Energies:
     bulk_viscosity: float
     contact_normal: float
     friction: float
-    joint: float
+    joint_spring: float
+    joint_damper: float
+    strap: float
+    tie: float
     external_work: float
     added_mass_kinetic: float
     integration: float
@@ -61,8 +70,9 @@ class Energies:
     @property
     def total(self) -> float:
         """Sum of what is stored and what is lost [J]."""
-        lost = self.bulk_viscosity + self.contact_normal + self.friction + self.joint
-        return self.kinetic + self.internal + self.hourglass + lost
+        lost = self.bulk_viscosity + self.contact_normal + self.friction
+        linked = self.joint_spring + self.joint_damper + self.strap + self.tie
+        return self.kinetic + self.internal + self.hourglass + lost + linked
 
     @property
     def ratio(self) -> float:
@@ -92,19 +102,27 @@ class Ledger:
     def __init__(self, n_parts: int, kinetic: float) -> None:
         self.initial = kinetic
         self.part_work = np.zeros((n_parts, 3))
-        # half steps before and after the present time: kinetic, absorbed, outside, joint
-        self._before = np.array([kinetic, 0.0, 0.0, 0.0])
+        # half steps before and after the present time: kinetic, absorbed, outside, tie, links
+        self._before = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         self._after = self._before.copy()
 
-    def advance(self, chunks: NDArray[np.float64], bodies: NDArray[np.float64]) -> None:
+    def advance(
+        self,
+        chunks: NDArray[np.float64],
+        bodies: NDArray[np.float64],
+        linked: tuple[NDArray[np.float64], float] | None = None,
+    ) -> None:
         """Enter the kick at the present time.
 
         Parameters
         ----------
         chunks : (n, 4) float64
             Sums of `kernels.assembly.advance_nodes`: kinetic energy, absorbed, outside, (runaways).
-        bodies : (n, 4) float64
-            Sums of `kernels.bodies.advance_bodies`: kinetic energy, absorbed, outside, tie.
+        bodies : (n, BODY_SUMS) float64
+            Sums of `kernels.bodies.advance_bodies`: kinetic energy, absorbed, outside, tie, (runaways).
+        linked
+            Work taken by joint springs, joint dampers and straps (3,), and what of it was done on free nodes, where
+            `chunks` has entered it as work from outside.
         """
         self._before, after = self._after, self._after.copy()
         nodes, carried = chunks.sum(axis=0), bodies.sum(axis=0)
@@ -112,11 +130,15 @@ class Ledger:
         after[1] += nodes[1] + carried[1]
         after[2] += nodes[2] + carried[2]
         after[3] += carried[3]
+        if linked is not None:
+            taken, on_nodes = linked
+            after[2] -= on_nodes
+            after[4:] += taken
         self._after = after
 
     def energies(self, added_mass_kinetic: float = 0.0) -> Energies:
         """Ledger at the present time: the mean of the half steps around it."""
-        kinetic, absorbed, outside, tie = (0.5 * (self._before + self._after)).tolist()
+        kinetic, absorbed, outside, tie, spring, damper, strap = (0.5 * (self._before + self._after)).tolist()
         stress, hourglass, viscosity = self.part_work.sum(axis=0).tolist()
         return Energies(
             kinetic=kinetic,
@@ -125,8 +147,11 @@ class Ledger:
             bulk_viscosity=viscosity,
             contact_normal=0.0,
             friction=0.0,
-            # `tie` is work that the constraint gives; joints are entered as work taken
-            joint=0.0 - tie,
+            joint_spring=spring,
+            joint_damper=damper,
+            strap=strap,
+            # `tie` is work that the constraint gives
+            tie=0.0 - tie,
             external_work=outside,
             added_mass_kinetic=added_mass_kinetic,
             integration=absorbed - stress - hourglass - viscosity,

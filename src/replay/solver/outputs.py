@@ -38,10 +38,13 @@ ENERGY_TABLE = TableFormat(
         Column("contact_normal_J", "work lost in normal contact"),
         Column("friction_J", "work lost in friction"),
         Column("external_work_J", "work of drivers, supports, loads and weight"),
-        Column("joint_J", "work taken by joints, and the rounding of rigid ties"),
+        Column("joint_spring_J", "work taken by the springs of joints"),
+        Column("joint_damper_J", "work lost in the dampers of joints"),
+        Column("strap_J", "work taken by straps: stored and lost, less what paying in brings"),
+        Column("tie_J", "work taken by rigid and tied nodes: rounding"),
         Column("added_mass_kinetic_J", "share of the kinetic energy that belongs to added mass"),
         Column("integration_J", "work of nodal forces on elements beyond stress, hourglass and viscosity"),
-        Column("total_J", "kinetic + internal + hourglass + viscosity + contact + friction + joints"),
+        Column("total_J", "kinetic + internal + hourglass + viscosity + contact + friction + joints + straps + ties"),
         Column("ratio", "total over initial energy plus external work"),
         Column("closure", "relative residual of the discrete energy identity: rounding only"),
         Column("momentum_x_N_s", "momentum of all that moves"),
@@ -114,7 +117,8 @@ class Histories:
         self._energy.append(
             [
                 view.time_s, e.kinetic, e.internal, e.hourglass, e.bulk_viscosity, e.contact_normal, e.friction,
-                e.external_work, e.joint, e.added_mass_kinetic, e.integration, e.total, e.ratio, e.closure,
+                e.external_work, e.joint_spring, e.joint_damper, e.strap, e.tie,
+                e.added_mass_kinetic, e.integration, e.total, e.ratio, e.closure,
                 *view.momentum,
             ]
         )  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,10 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InputError
+from replay.solver.arrays import WHERE, checked_array, checked_integers, checked_rows
+from replay.solver.joints import Joint
 from replay.solver.kernels.geometry import element_gradients
 from replay.solver.materials import LAWS, Material, law_parameters
-
-WHERE = "solver problem"
+from replay.solver.prescribed import PrescribedMotion, RigidSet
+from replay.solver.straps import Strap
+from replay.solver.ties import Tie, check_ties
 
 
 @dataclass(frozen=True)
@@ -121,65 +123,6 @@ class Controls:
             )
 
 
-@dataclass(frozen=True)
-class PrescribedMotion:
-    """Rigid parts driven as one body along a given 6-DOF motion.
-
-    A node of the body goes along ``X(t) = x(t) + R(t) R(0)^T (X(0) - x(0))``, where time 0 is the
-    start of the run; x by cubic Hermite interpolation, R by Hermite interpolation of the
-    quaternion.
-
-    Parameters
-    ----------
-    pids
-        Numbers of rigid parts.
-    times : (k,) float64
-        Increasing [s]; the first is at or before 0, the last at or after the end of the run.
-    positions, velocities : (k, 3) float64
-        Of the reference point [m], [m/s].
-    quaternions : (k, 4) float64
-        (x, y, z, w), body to space.
-    angular_velocities : (k, 3) float64
-        In space [rad/s].
-    """
-
-    pids: tuple[int, ...]
-    times: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    quaternions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    angular_velocities: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        times = _array(self.times, "prescribed.times", (None,))
-        k = len(times)
-        object.__setattr__(self, "pids", tuple(int(p) for p in self.pids))
-        object.__setattr__(self, "times", times)
-        for name, width in (("positions", 3), ("velocities", 3), ("angular_velocities", 3), ("quaternions", 4)):
-            object.__setattr__(self, name, _array(getattr(self, name), f"prescribed.{name}", (k, width)))
-        if k < 2 or (np.diff(times) <= 0).any():
-            raise InputError(
-                WHERE,
-                "the times do not increase",
-                column="prescribed.times",
-                expected="at least two times, each later than the one before",
-            )
-        size = np.linalg.norm(self.quaternions, axis=1)
-        if (abs(size - 1) > 1e-6).any():
-            row = int(np.argmax(abs(size - 1)))
-            raise InputError(
-                WHERE,
-                f"quaternion {row} has length {size[row]:.6g}",
-                column="prescribed.quaternions",
-                expected="unit quaternions (x, y, z, w)",
-            )
-        # neighbours on one side of the sphere: q and -q are one rotation, but their mean is not
-        turns = np.cumprod(np.where((self.quaternions[1:] * self.quaternions[:-1]).sum(axis=1) < 0, -1.0, 1.0))
-        quaternions = self.quaternions / size[:, None]
-        quaternions[1:] *= turns[:, None]
-        object.__setattr__(self, "quaternions", quaternions)
-
-
 def _absent() -> NDArray[Any]:
     """Stand in for an array that is not given."""
     return np.empty(0)
@@ -208,7 +151,7 @@ class Problem:
     initial_velocity : (n, 3) float64, optional
         At time 0 [m/s]; rigid bodies take the momentum of their nodes. A driven body starts with its driver.
     prescribed
-        Motion of the driven body.
+        Motions of driven bodies, one a body; a single one may stand by itself.
     node_ids, element_ids : (n,), (m,) int64, optional
         Numbers in outputs and messages; 1, 2, ... by default.
     fixed : (n, 3) bool, optional
@@ -217,6 +160,10 @@ class Problem:
         Loads from time 0 on [N].
     initial_stress : (m, 6) float64, optional
         Cauchy stress xx, yy, zz, xy, yz, zx at time 0 [Pa]; only for laws that say ``INITIAL_STRESS``.
+    rigid_sets
+        Nodes that move as bodies.
+    joints, straps, ties
+        Force elements between bodies, cables through nodes, tied interfaces.
 
     Raises
     ------
@@ -230,33 +177,41 @@ class Problem:
     parts: tuple[SolverPart, ...]
     controls: Controls
     initial_velocity: NDArray[np.float64] = field(default_factory=_absent)
-    prescribed: PrescribedMotion | None = None
+    prescribed: tuple[PrescribedMotion, ...] = ()
     node_ids: NDArray[np.int64] = field(default_factory=_absent)
     element_ids: NDArray[np.int64] = field(default_factory=_absent)
     fixed: NDArray[np.bool_] = field(default_factory=_absent)
     nodal_forces: NDArray[np.float64] = field(default_factory=_absent)
     initial_stress: NDArray[np.float64] = field(default_factory=_absent)
+    rigid_sets: tuple[RigidSet, ...] = ()
+    joints: tuple[Joint, ...] = ()
+    straps: tuple[Strap, ...] = ()
+    ties: tuple[Tie, ...] = ()
 
     def __post_init__(self) -> None:
         put = object.__setattr__
-        nodes = _array(self.nodes, "nodes", (None, 3))
+        nodes = checked_array(self.nodes, "nodes", (None, 3))
         n = len(nodes)
         put(self, "nodes", nodes)
-        put(self, "hexes", _integers(self.hexes, "hexes", (None, 8)))
+        put(self, "hexes", checked_integers(self.hexes, "hexes", (None, 8)))
         m = len(self.hexes)
-        put(self, "element_part", _integers(self.element_part, "element_part", (m,)))
+        put(self, "element_part", checked_integers(self.element_part, "element_part", (m,)))
         put(self, "parts", tuple(self.parts))
         numbers = np.arange(1, n + 1) if _is_absent(self.node_ids) else self.node_ids
-        put(self, "node_ids", _integers(numbers, "node_ids", (n,)))
+        put(self, "node_ids", checked_integers(numbers, "node_ids", (n,)))
         numbers = np.arange(1, m + 1) if _is_absent(self.element_ids) else self.element_ids
-        put(self, "element_ids", _integers(numbers, "element_ids", (m,)))
+        put(self, "element_ids", checked_integers(numbers, "element_ids", (m,)))
         for name, shape in (("initial_velocity", (n, 3)), ("nodal_forces", (n, 3)), ("initial_stress", (m, 6))):
             value = getattr(self, name)
-            put(self, name, np.zeros(shape) if _is_absent(value) else _array(value, name, shape))
+            put(self, name, np.zeros(shape) if _is_absent(value) else checked_array(value, name, shape))
         fixed = np.zeros((n, 3), bool) if _is_absent(self.fixed) else np.array(self.fixed, dtype=bool)
         if fixed.shape != (n, 3):
             raise InputError(WHERE, f"its shape is {fixed.shape}", column="fixed", expected=f"({n}, 3)")
         put(self, "fixed", fixed)
+        alone = isinstance(self.prescribed, PrescribedMotion)
+        put(self, "prescribed", (self.prescribed,) if alone else tuple(self.prescribed or ()))
+        for name in ("rigid_sets", "joints", "straps", "ties"):
+            put(self, name, tuple(getattr(self, name)))
         self._check()
 
     def _check(self) -> None:
@@ -317,34 +272,32 @@ class Problem:
                     WHERE, f"part {part.name!r} of the law {part.material.law!r} has an initial stress",
                     column="initial_stress", expected="only laws whose stress is not a function of the deformation",
                 )  # fmt: skip
-        if self.prescribed is None:
-            return
-        known = {part.pid: part for part in self.parts}
-        for pid in self.prescribed.pids:
-            if pid not in known:
-                raise InputError(
-                    WHERE,
-                    f"part {pid} does not exist",
-                    column="prescribed.pids",
-                    expected=", ".join(map(str, sorted(known))),
-                )
-            if not known[pid].material.is_rigid:
-                raise InputError(
-                    WHERE,
-                    f"part {pid} ({known[pid].name!r}) deforms",
-                    column="prescribed.pids",
-                    expected="parts of the law 'rigid'",
-                )
-        if not self.prescribed.pids:
-            raise InputError(WHERE, "no part is driven", column="prescribed.pids", expected="at least one part")
-        times, end = self.prescribed.times, self.controls.termination_time_s
-        if times[0] > 1e-12 * end or times[-1] < end * (1 - 1e-9):
-            raise InputError(
-                WHERE,
-                f"the motion is known from {times[0]:.6g} to {times[-1]:.6g} s, the run lasts from 0 to {end:.6g} s",
-                column="prescribed.times",
-                mend="shorten the run or extend the motion",
-            )
+        self._check_names()
+        rigid = self.rigid_names()
+        deforming = {part.pid: part.name for part in self.parts if not part.material.is_rigid}
+        for rigid_set in self.rigid_sets:
+            checked_rows(rigid_set.nodes, f"rigid_sets.{rigid_set.name}.nodes", len(self.nodes))
+        for motion in self.prescribed:
+            motion.check(rigid, deforming, self.controls.termination_time_s)
+        for joint in self.joints:
+            joint.check(rigid)
+        for strap in self.straps:
+            strap.check(self.nodes)
+        check_ties(self.ties, self.nodes, self.node_ids, self.fixed)
+
+    def _check_names(self) -> None:
+        for kind in ("rigid_sets", "joints", "straps", "ties"):
+            names = [item.name for item in getattr(self, kind)]
+            for name in names:
+                if not name or names.count(name) > 1:
+                    raise InputError(
+                        WHERE, f"the name {name!r} is empty or occurs twice", column=kind, expected="a name of its own"
+                    )
+
+    def rigid_names(self) -> dict[int | str, str]:
+        """Rigid parts by number and rigid sets by name: everything that a joint or a motion may name."""
+        parts: dict[int | str, str] = {part.pid: part.name for part in self.parts if part.material.is_rigid}
+        return parts | {s.name: s.name for s in self.rigid_sets}
 
     def part_of(self, row: int) -> SolverPart:
         """Part of the element in one row."""
@@ -416,26 +369,3 @@ def initial_velocity_about_axis(
             mend="move Q along the angular velocity",
         )
     return np.asarray(translation, float) + np.cross(omega * (q - p) / length, np.asarray(nodes, float) - p)
-
-
-def _array(value: Any, name: str, shape: Sequence[int | None]) -> NDArray[np.float64]:
-    array = np.array(value, dtype=float, order="C")
-    _check_shape(array, name, shape)
-    if not np.isfinite(array).all():
-        row = np.argwhere(~np.isfinite(array))[0]
-        raise InputError(WHERE, f"row {row[0]} holds {array[tuple(row)]}", column=name, expected="finite numbers")
-    return array
-
-
-def _integers(value: Any, name: str, shape: Sequence[int | None]) -> NDArray[np.int64]:
-    array = np.array(value)
-    _check_shape(array, name, shape)
-    if not np.issubdtype(array.dtype, np.integer):
-        raise InputError(WHERE, f"its numbers are {array.dtype}", column=name, expected="whole numbers")
-    return array.astype(np.int64)
-
-
-def _check_shape(array: NDArray[Any], name: str, shape: Sequence[int | None]) -> None:
-    if array.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, array.shape)):
-        wanted = ", ".join("any" if k is None else str(k) for k in shape)
-        raise InputError(WHERE, f"its shape is {array.shape}", column=name, expected=f"({wanted})")

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.errors import InputError
-from replay.solver.kernels.bodies import BODY_SUMS, advance_bodies, prescribed_pose
+from replay.solver.arrays import WHERE
+from replay.solver.kernels.bodies import BODY_SUMS, advance_bodies, prescribed_pose, present_twists
 from replay.solver.kernels.lanes import POSITION, VELOCITY
 from replay.solver.layout import Layout
-from replay.solver.problem import WHERE, PrescribedMotion, Problem
+from replay.solver.prescribed import PrescribedMotion
+from replay.solver.problem import Problem
 
 _GAUSS = 0.5773502691896257
 _SIGNS = np.array(
@@ -44,10 +46,15 @@ class Pose:
 def pose_at(motion: PrescribedMotion, t: float) -> Pose:
     """Prescribed pose at time `t` [s]."""
     row = np.empty(13)
+    _pose_row(motion, t, row)
+    return Pose(row[0:3], row[3:7], row[7:10], row[10:13])
+
+
+def _pose_row(motion: PrescribedMotion, t: float, row: NDArray[np.float64]) -> None:
+    """Write the prescribed pose at time `t` and its rates (13,)."""
     prescribed_pose(
         motion.times, motion.positions, motion.quaternions, motion.velocities, motion.angular_velocities, t, row
     )
-    return Pose(row[0:3], row[3:7], row[7:10], row[10:13])
 
 
 def rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -63,7 +70,7 @@ def rotation(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 class Bodies:
-    """All rigid bodies of a run; the driven one, if any, is number 0.
+    """All rigid bodies of a run; the driven ones come first, in the order of their motions.
 
     Parameters
     ----------
@@ -73,24 +80,36 @@ class Bodies:
         Lumped mass of every solver node, rigid elements included [kg].
     soft_mass : (n,) float64
         The share of deformable elements in it [kg].
+    loads : (n, 3) float64
+        On every solver node [N].
+
+    Attributes
+    ----------
+    wrench : (n_bodies, 6) float64
+        Force and torque about the centre that joints and straps exert, in space [N], [N m].
+    twist : (n_bodies, 6) float64
+        Velocity of the centre and angular velocity in space: after `look` half a step before the present time,
+        after `kick` the mean over the kick [m/s], [rad/s].
     """
 
     def __init__(
-        self, problem: Problem, layout: Layout, node_mass: NDArray[np.float64], soft_mass: NDArray[np.float64]
+        self,
+        problem: Problem,
+        layout: Layout,
+        node_mass: NDArray[np.float64],
+        soft_mass: NDArray[np.float64],
+        loads: NDArray[np.float64],
     ) -> None:
-        self.parts = layout.body_parts
+        self.parts, self.sets = layout.body_parts, layout.body_sets
         count = len(self.parts)
         self.count = count
-        self.motion = problem.prescribed
-        self.driven = np.zeros(count, bool)
-        if self.motion is not None:
-            self.driven[0] = True
+        self.motions = problem.prescribed
+        self.driven = np.arange(count) < len(self.motions)
         self._first = layout.n_free
         self._begin, self._end = layout.body_begin, layout.body_end
-        tied = layout.node_order[layout.n_free :]
-        self._external = problem.nodal_forces[tied].copy()
-        self.inner = np.zeros((len(tied), 3))
-        self._lever = np.zeros((len(tied), 3))
+        self._external = loads[layout.n_free :].copy()
+        self.inner = np.zeros_like(self._external)
+        self._lever = np.zeros_like(self._external)
         self._node_mass = node_mass[layout.n_free :]
         self._gravity = np.array(problem.controls.gravity_m_per_s2, float)
         self.mass = np.zeros(count)
@@ -103,7 +122,8 @@ class Bodies:
         self._next_centre = np.zeros((count, 3))
         self._next_quaternion = np.zeros((count, 4))
         self.sums = np.zeros((count, BODY_SUMS))
-        self._row = np.empty(13)
+        self.wrench, self.twist = np.zeros((count, 6)), np.zeros((count, 6))
+        self._told = np.zeros((count, 13))
         for body in range(count):
             self._build(problem, layout, body, soft_mass)
 
@@ -112,20 +132,27 @@ class Bodies:
         rows = layout.node_order[layout.n_free :][here]
         points, lumped = problem.nodes[rows], self._node_mass[here]
         if self.driven[body]:
-            assert self.motion is not None
-            pose = pose_at(self.motion, 0.0)
+            pose = pose_at(self.motions[body], 0.0)
             self.centre[body], self.quaternion[body] = pose.position, pose.quaternion
             self._lever[here] = (points - pose.position) @ rotation(pose.quaternion)
             return
         mask = np.isin(problem.element_part, self.parts[body])
         density = np.array([part.material.density_kg_per_m3 for part in problem.parts])[problem.element_part[mask]]
-        place, weight = _quadrature(problem.nodes[problem.hexes[mask]], density)
-        place = np.concatenate([place, points])
-        weight = np.concatenate([weight, soft_mass[layout.n_free :][here]])
+        place, weight = points, soft_mass[layout.n_free :][here]
+        if mask.any():
+            within, share = _quadrature(problem.nodes[problem.hexes[mask]], density)
+            place, weight = np.concatenate([within, place]), np.concatenate([share, weight])
         self.mass[body] = weight.sum()
         centre = weighted_sum(weight, place) / self.mass[body]
         inertia = inertia_tensor(weight, place - centre)
         self.centre[body] = centre
+        if not np.linalg.eigvalsh(inertia)[0] > 1e-12 * np.trace(inertia):
+            names = [problem.parts[k].name for k in self.parts[body]]
+            names += [problem.rigid_sets[k].name for k in self.sets[body]]
+            raise InputError(
+                WHERE, f"the body of {', '.join(names)} has no inertia about some axis", column="rigid_sets",
+                expected="three nodes that are not on one line",
+            )  # fmt: skip
         self.inverse_inertia[body] = np.linalg.inv(inertia)
         self._lever[here] = points - centre
         velocity, omega = fit_rigid_motion(points, problem.initial_velocity[rows], lumped, centre)
@@ -135,8 +162,7 @@ class Bodies:
         """Give the tied nodes the velocity of their body at time 0."""
         for body in range(self.count):
             if self.driven[body]:
-                assert self.motion is not None
-                pose = pose_at(self.motion, 0.0)
+                pose = pose_at(self.motions[body], 0.0)
                 velocity, omega = pose.velocity, pose.angular_velocity
             else:
                 velocity, omega = self.velocity[body], self.inverse_inertia[body] @ self.spin[body]
@@ -144,22 +170,31 @@ class Bodies:
             arm = nodal[rows, POSITION : POSITION + 3] - self.centre[body]
             nodal[rows, VELOCITY : VELOCITY + 3] = velocity + np.cross(omega, arm)
 
-    def kick(self, nodal: NDArray[np.float64], time: float, dt_kick: float, dt_drift: float) -> None:
+    def look(self, time: float) -> None:
+        """Find `twist` at the present time, for joints and straps, and let them start from no `wrench`."""
+        for body, motion in enumerate(self.motions):
+            _pose_row(motion, time, self._told[body])
+        present_twists(
+            self.driven, self._told, self.quaternion, self.velocity, self.spin, self.inverse_inertia, self.twist
+        )
+        self.wrench[:] = 0.0
+
+    def kick(
+        self, nodal: NDArray[np.float64], time: float, dt_kick: float, dt_drift: float, speed_limit: float = np.inf
+    ) -> None:
         """Bring the velocities over the present time and find the pose at ``time + dt_drift``.
 
         `inner` must hold the element forces on the tied nodes.
         """
-        if self.motion is not None:
-            m = self.motion
-            prescribed_pose(
-                m.times, m.positions, m.quaternions, m.velocities, m.angular_velocities, time + dt_drift, self._row
-            )
-            self._next_centre[0] = self._row[0:3]
-            self._next_quaternion[0] = self._row[3:7]
+        for body, motion in enumerate(self.motions):
+            _pose_row(motion, time + dt_drift, self._told[body])
+            self._next_centre[body] = self._told[body, 0:3]
+            self._next_quaternion[body] = self._told[body, 3:7]
         advance_bodies(
             nodal, self._first, self._begin, self._end, self.inner, self._external, self._lever, self._node_mass,
-            self.driven, self.mass, self.inverse_inertia, self._gravity, self.centre, self.quaternion, self.velocity,
-            self.spin, self._next_centre, self._next_quaternion, self.spin_before, dt_kick, dt_drift, self.sums,
+            self.wrench, self.driven, self.mass, self.inverse_inertia, self._gravity, self.centre, self.quaternion,
+            self.velocity, self.spin, self._next_centre, self._next_quaternion, self.spin_before, self.twist, dt_kick,
+            dt_drift, speed_limit, self.sums,
         )  # fmt: skip
 
     def drift(self) -> None:

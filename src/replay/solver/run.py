@@ -22,7 +22,8 @@ from replay.errors import InstabilityError
 from replay.files import write_json
 from replay.solver.checkpoint import Checkpoints, Signals, code_hash, identity
 from replay.solver.integrator import Integrator
-from replay.solver.outputs import Histories, States
+from replay.solver.link_histories import link_recorders
+from replay.solver.outputs import ENERGY_TABLE, Histories, States
 from replay.solver.problem import Controls, Problem
 from replay.solver.progress import Progress
 from replay.solver.threads import ThreadChoice
@@ -118,7 +119,7 @@ class _Run:
     def __init__(
         self, problem: Problem, folder: Path, recorders: Sequence[Recorder], resume: bool, stream: TextIO | None
     ) -> None:
-        self.problem, self.folder, self.recorders = problem, folder, list(recorders)
+        self.problem, self.folder, self.recorders = problem, folder, [*link_recorders(problem), *recorders]
         self.controls = problem.controls
         self.progress = Progress(stream, self.controls.termination_time_s)
         self.integrator = Integrator(problem, speed_limit(problem))
@@ -130,6 +131,8 @@ class _Run:
         self._last_state_s = -1.0
         self._soft = np.array([not p.material.is_rigid for p in problem.parts])[problem.element_part]
         saved = self.checkpoints.read() if resume else None
+        for path in self.checkpoints.damaged:
+            self.progress.note(f"{path.name} is damaged; going back to the checkpoint before it")
         if saved is None:
             self.checkpoints.clear()
         else:
@@ -236,7 +239,7 @@ class _Run:
         names = [part.name for part in self.problem.parts]
         mass = np.bincount(self.problem.element_part, integrator.element_mass, len(names))
         table = self.histories.state()["energy"]
-        ratio = table[:, 12]
+        ratio = table[:, ENERGY_TABLE.names.index("ratio")]
         energies = integrator.energies(integrator.velocities())
         summary = RunSummary(
             ran_to_end=not stopped,
@@ -292,8 +295,9 @@ def solve(
     problem
         Arrays and settings.
     folder
-        Gets timestep.csv, energy.csv, part_energy.csv, histories.csv, states.vtkhdf, run.json, what the
-        recorders write, and while the run lasts a folder ``checkpoint``.
+        Gets timestep.csv, energy.csv, part_energy.csv, histories.csv, states.vtkhdf, run.json; joints.csv,
+        straps.csv, ties.csv and rigid_sets.csv where the problem has any; what the recorders write; and while the
+        run lasts a folder ``checkpoint``.
     recorders
         See `Recorder`; called at every history time.
     threads

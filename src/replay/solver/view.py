@@ -53,6 +53,8 @@ class StateView:
         [m], [m/s].
     energies
         The ledger.
+    links, tied
+        Joints and straps, ties: their forces at this time.
     """
 
     def __init__(self, integrator: Integrator, velocities: NDArray[np.float64], reference: ReferenceGradients) -> None:
@@ -66,6 +68,7 @@ class StateView:
         self.coordinates = integrator.user_order(integrator.nodal[:, POSITION : POSITION + 3])
         self.velocities = integrator.user_order(velocities)
         self.energies: Energies = integrator.energies(velocities)
+        self.links, self.tied = integrator.links, integrator.tied
 
     @property
     def displacements(self) -> NDArray[np.float64]:
@@ -81,6 +84,11 @@ class StateView:
     def volumes(self) -> NDArray[np.float64]:
         """Volumes (m,) [m^3]."""
         return gradients(self.coordinates, self.problem.hexes)[1]
+
+    @property
+    def reference_volumes(self) -> NDArray[np.float64]:
+        """Volumes before deformation (m,) [m^3]."""
+        return self._reference.volume
 
     @cached_property
     def von_mises(self) -> NDArray[np.float64]:
@@ -105,11 +113,11 @@ class StateView:
         return np.einsum("eci,ecj->eij", modal, self._reference.scaled)
 
     @cached_property
-    def poses(self) -> dict[int, Pose]:
-        """Pose of the body of every rigid part by part number, read off its nodes."""
-        bodies, parts = self._integrator.bodies, self.problem.parts
-        found: dict[int, Pose] = {}
-        for body, members in enumerate(bodies.parts):
+    def body_poses(self) -> list[Pose]:
+        """Pose of every rigid body, read off its nodes."""
+        bodies = self._integrator.bodies
+        found = []
+        for body in range(bodies.count):
             rows = bodies.tied_rows(body)
             points = self._integrator.nodal[rows, POSITION : POSITION + 3]
             mass = self._integrator.mass[rows]
@@ -118,9 +126,20 @@ class StateView:
             if bodies.driven[body]:
                 told = bodies.quaternion[body]
                 quaternion = quaternion if quaternion @ told >= 0 else -quaternion
-            pose = Pose(position, quaternion, velocity, omega)
-            found |= {parts[k].pid: pose for k in members}
+            found.append(Pose(position, quaternion, velocity, omega))
         return found
+
+    @cached_property
+    def poses(self) -> dict[int, Pose]:
+        """Pose of the body of every rigid part by part number."""
+        members = zip(self.body_poses, self._integrator.bodies.parts)
+        return {self.problem.parts[k].pid: pose for pose, parts in members for k in parts}
+
+    @cached_property
+    def set_poses(self) -> dict[str, Pose]:
+        """Pose of the body of every rigid set by name."""
+        members = zip(self.body_poses, self._integrator.bodies.sets)
+        return {self.problem.rigid_sets[k].name: pose for pose, sets in members for k in sets}
 
     @cached_property
     def part_motion(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

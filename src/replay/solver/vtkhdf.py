@@ -12,6 +12,7 @@ it, which refers to the same datasets.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
@@ -158,18 +159,24 @@ class StatesWriter:
             body.append(values.tobytes())
         record = b"".join(body)
         record += struct.pack("<I", zlib.crc32(record))
-        try:
+        with self._told_when_full():
             stream.seek(self._start + self.n_states * self._record_size)
             stream.write(record)
             stream.flush()
-        except OSError as error:
-            message = f"{self.partial_path}: cannot be written ({error.strerror})\n    mend: free disk space and resume"
-            raise ReplayError(message) from error
         self.n_states += 1
 
     def sync(self) -> None:
         """Force the states onto the disk; call before a checkpoint that counts on them is written."""
-        os.fsync(self._open().fileno())
+        with self._told_when_full():
+            os.fsync(self._open().fileno())
+
+    @contextlib.contextmanager
+    def _told_when_full(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            message = f"{self.partial_path}: cannot be written ({error.strerror})\n    mend: free disk space and resume"
+            raise ReplayError(message) from error
 
     def rewind(self, n_states: int) -> None:
         """Drop every state after the first `n_states`, as if they had never been written.

@@ -22,10 +22,10 @@ def speed_limit(problem: Problem) -> float:
     if problem.controls.speed_limit_m_per_s > 0:
         return problem.controls.speed_limit_m_per_s
     fastest = float(np.sqrt((problem.initial_velocity**2).sum(axis=1)).max())
-    if problem.prescribed is not None:
-        motion = problem.prescribed
+    for motion in problem.prescribed:
         rigid = [k for k, part in enumerate(problem.parts) if part.pid in motion.pids]
-        rows = np.unique(problem.hexes[np.isin(problem.element_part, rigid)])
+        sets = [s.nodes for s in problem.rigid_sets if s.name in motion.rigid_sets]
+        rows = np.unique(np.concatenate([problem.hexes[np.isin(problem.element_part, rigid)].ravel(), *sets]))
         reach = np.sqrt(((problem.nodes[rows] - motion.positions[0]) ** 2).sum(axis=1).max()) if len(rows) else 0.0
         linear = np.sqrt((motion.velocities**2).sum(axis=1))
         turning = reach * np.sqrt((motion.angular_velocities**2).sum(axis=1))
@@ -49,6 +49,12 @@ def check_step(integrator: Integrator, bound: StepBound) -> None:
         return
     problem = integrator.problem
     row = bound.element
+    if row < 0:
+        message = (
+            f"joints or straps want a time step of {bound.step_s:.3g} s, below the floor of {floor:.3g} s, at "
+            f"{integrator.time_s:.6g} s\n    mend: soften them, or give their bodies more mass"
+        )
+        raise InstabilityError(message)
     part = problem.part_of(row)
     where = f"element {problem.element_ids[row]} of part {part.pid} ({part.name})"
     at = f"at {integrator.time_s:.6g} s (step {integrator.step})"
@@ -85,7 +91,6 @@ def check_speed(integrator: Integrator) -> None:
     velocity = integrator.nodal[:, VELOCITY : VELOCITY + 3]
     speed = np.sqrt((velocity**2).sum(axis=1))
     bad = ~(speed <= integrator.speed_limit)
-    bad[integrator.layout.n_free :] = False
     row = int(np.argmax(np.where(bad, np.where(np.isfinite(speed), speed, np.inf), 0.0)))
     user = int(integrator.layout.node_order[row])
     problem = integrator.problem

@@ -237,7 +237,7 @@ _COMMANDS = {
     "assembly": "assemble",
     "decks": "decks",
     "shake": "shake",
-    "replay": "solve",
+    "replay": "impact",
     "sensitivity": "sensitivity",
     "fidelity": "fidelity",
     "measures": "measure",

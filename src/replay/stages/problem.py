@@ -55,7 +55,7 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Prob
         Numerical settings.
     """
     arms = driver.rotation[0].apply(model.nodes)
-    parts = _parts(model)
+    parts = solver_parts(model)
     return Problem(
         nodes=driver.position_m[0] + arms,
         hexes=model.hexes,
@@ -63,13 +63,15 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Prob
         parts=parts,
         controls=controls,
         initial_velocity=driver.velocity_m_per_s[0] + np.cross(driver.omega_rad_per_s[0], arms),
-        prescribed=PrescribedMotion(
-            pids=tuple(part.pid for part in model.parts if part.role == "skull"),
-            times=driver.time_s,
-            positions=driver.position_m,
-            quaternions=driver.rotation.as_quat(),
-            velocities=driver.velocity_m_per_s,
-            angular_velocities=driver.omega_rad_per_s,
+        prescribed=(
+            PrescribedMotion(
+                pids=tuple(part.pid for part in model.parts if part.role == "skull"),
+                times=driver.time_s,
+                positions=driver.position_m,
+                quaternions=driver.rotation.as_quat(),
+                velocities=driver.velocity_m_per_s,
+                angular_velocities=driver.omega_rad_per_s,
+            ),
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
@@ -93,7 +95,7 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Pr
         nodes=helmet.nodes,
         hexes=helmet.hexes,
         element_part=helmet.element_part,
-        parts=_parts(helmet),
+        parts=solver_parts(helmet),
         controls=controls,
         initial_velocity=np.tile([speed_m_per_s, 0.0, 0.0], (len(helmet.nodes), 1)),
         node_ids=helmet.node_ids,
@@ -101,7 +103,8 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Pr
     )
 
 
-def _parts(model: Model) -> tuple[SolverPart, ...]:
+def solver_parts(model: Model) -> tuple[SolverPart, ...]:
+    """Parts of a head and helmet model with their materials."""
     parts = []
     for part in model.parts:
         facts = model.materials[part.material]

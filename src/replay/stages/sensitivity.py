@@ -10,7 +10,7 @@ from replay.files import write_json
 from replay.gates import hourglass_sensitivity_gate
 from replay.measures import regional_summary
 from replay.stages.frame import Stage, Workspace
-from replay.stages.solve import UNFINISHED, run_driven
+from replay.stages.impact import UNFINISHED, run_driven
 from replay.stages.verdict import limits_of
 
 _FACTOR = 0.5

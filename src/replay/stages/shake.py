@@ -9,9 +9,9 @@ from replay.gates import ledger_values, shake_gate
 from replay.measures import ShakeRecorder, shake_measures
 from replay.models import read_model
 from replay.stages.frame import Stage, Workspace
+from replay.stages.impact import RUN_FILES, UNFINISHED, run_solver
 from replay.stages.problem import controls_of, helmet_problem
 from replay.stages.settings import read_settings
-from replay.stages.solve import RUN_FILES, UNFINISHED, run_solver
 from replay.stages.verdict import limits_of
 
 

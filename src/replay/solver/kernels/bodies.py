@@ -16,8 +16,9 @@ from replay.solver.kernels.device import compiled, device
 from replay.solver.kernels.lanes import POSITION, VELOCITY
 from replay.solver.kernels.tensors import add, add_scaled, apply, cross, dot, scale
 
-#: Sums over a body: kinetic energy, work absorbed by elements, work from outside, work of the rigid tie [J].
-BODY_SUMS = 4
+#: Sums over a body: kinetic energy, work absorbed by elements, work from outside, work of the rigid tie [J], nodes that
+#: are too fast.
+BODY_SUMS = 5
 _MOST_ITERATIONS = 60
 
 
@@ -73,8 +74,9 @@ turn = compiled(_turn)
 
 
 def _advance_bodies(
-    nodal, first_tied, begin, end, inner, external, lever, node_mass, driven, mass, inverse_inertia, gravity,
-    centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, dt_kick, dt_drift, sums,
+    nodal, first_tied, begin, end, inner, external, lever, node_mass, wrench, driven, mass, inverse_inertia, gravity,
+    centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, twist, dt_kick, dt_drift,
+    speed_limit, sums,
 ):  # fmt: skip
     """Kick every body, find its pose at the end of the step, and give its nodes the velocity that leads there.
 
@@ -88,6 +90,8 @@ def _advance_bodies(
         Tied nodes of each body, counted from `first_tied`.
     inner, external, lever, node_mass : (n_tied, 3) or (n_tied,) float64
         Element forces [N], loads [N], offset from the centre in the body frame [m], lumped mass [kg].
+    wrench : (n_bodies, 6) float64
+        Force [N] and torque about the centre [N m] of joints and straps, in space.
     driven : (n_bodies,) bool
         Whether `next_centre` and `next_quaternion` are prescribed rather than found.
     mass, inverse_inertia, gravity
@@ -99,9 +103,14 @@ def _advance_bodies(
         Pose at the end of the step (output for free bodies).
     spin_before
         Angular momentum at this orientation before the kick (kept for output).
+    twist : (n_bodies, 6) float64
+        Velocity of the centre [m/s] and angular velocity in space [rad/s]: of a free body the mean over the kick
+        (output), of a driven one as it is told.
     dt_kick, dt_drift : float
         Mean of the steps before and after, step after [s].
-    sums : (n_bodies, 4) float64
+    speed_limit : float
+        Faster nodes, and velocities that are not numbers, are counted [m/s].
+    sums : (n_bodies, BODY_SUMS) float64
         See `BODY_SUMS` (output): kinetic energy after the kick, works of the kick.
     """
     for body in range(begin.shape[0]):
@@ -110,9 +119,11 @@ def _advance_bodies(
         kinetic_before = 0.0
         kinetic = 0.0
         weight_work = 0.0
+        force = (wrench[body, 0], wrench[body, 1], wrench[body, 2])
+        moment = (wrench[body, 3], wrench[body, 4], wrench[body, 5])
         if not driven[body]:
-            total = (0.0, 0.0, 0.0)
-            torque = (0.0, 0.0, 0.0)
+            total = force
+            torque = moment
             for k in range(begin[body], end[body]):
                 f = add_scaled(_vector(external, k), -1.0, _vector(inner, k))
                 total = add(total, f)
@@ -126,6 +137,11 @@ def _advance_bodies(
             kinetic_before = 0.5 * mass[body] * dot(old, old) + 0.5 * dot(spin_old, apply(tensor, spin_old))
             kinetic = 0.5 * mass[body] * dot(new, new) + 0.5 * dot(spin_new, apply(tensor, spin_new))
             weight_work = 0.5 * dt_kick * mass[body] * dot(g, add(old, new))
+            mean = scale(0.5, add(old, new))
+            mean_turn = apply(pose, apply(tensor, scale(0.5, add(spin_old, spin_new))))
+            for axis in range(3):
+                twist[body, axis] = mean[axis]
+                twist[body, 3 + axis] = mean_turn[axis]
             spin_end, omega = turn(spin_new, tensor, dt_drift)
             # quaternion of the Cayley map: (dt omega / 2, 1), normalised, on the body's side
             hx, hy, hz = scale(0.5 * dt_drift, omega)
@@ -148,11 +164,17 @@ def _advance_bodies(
             next_quaternion[body, 0], next_quaternion[body, 1], next_quaternion[body, 2], next_quaternion[body, 3]
         )
         c = _vector(next_centre, body)
+        linked = dt_kick * (
+            dot(force, (twist[body, 0], twist[body, 1], twist[body, 2]))
+            + dot(moment, (twist[body, 3], twist[body, 4], twist[body, 5]))
+        )
         absorbed = 0.0
         loaded = 0.0
         square_before = 0.0
         square = 0.0
+        runaways = 0.0
         for k in range(begin[body], end[body]):
+            fast = 0.0
             node = first_tied + k
             place = add(c, apply(pose, _vector(lever, k)))
             for axis in range(3):
@@ -163,18 +185,41 @@ def _advance_bodies(
                 loaded += external[k, axis] * mean
                 square_before += node_mass[k] * before * before
                 square += node_mass[k] * after * after
+                fast += after * after
                 nodal[node, VELOCITY + axis] = after
+            runaways += 0.0 if fast <= speed_limit * speed_limit else 1.0
+        sums[body, 4] = runaways
         if driven[body]:
-            # whoever drives the body pays for its kinetic energy and for what its elements absorb
+            # whoever drives the body pays for its kinetic energy and for what elements, joints and straps take
             sums[body, 0] = 0.5 * square
             sums[body, 1] = absorbed
-            sums[body, 2] = 0.5 * (square - square_before) + absorbed
+            sums[body, 2] = 0.5 * (square - square_before) + absorbed - linked
             sums[body, 3] = 0.0
         else:
             sums[body, 0] = kinetic
             sums[body, 1] = absorbed
             sums[body, 2] = loaded + weight_work
-            sums[body, 3] = kinetic - kinetic_before + absorbed - loaded - weight_work
+            sums[body, 3] = kinetic - kinetic_before + absorbed - loaded - weight_work - linked
+
+
+def _present_twists(driven, told, quaternion, velocity, spin, inverse_inertia, twist):
+    """Velocity of the centre and angular velocity in space of every body, half a step before the present time.
+
+    Parameters
+    ----------
+    driven, told
+        Whether a body is driven, and its pose and rates at the present time (n_bodies, 13) then.
+    quaternion, velocity, spin, inverse_inertia
+        See `advance_bodies`.
+    twist : (n_bodies, 6) float64
+        [m/s], [rad/s] (output).
+    """
+    for body in range(driven.shape[0]):
+        pose = rotation_matrix(quaternion[body, 0], quaternion[body, 1], quaternion[body, 2], quaternion[body, 3])
+        omega = apply(pose, apply(_matrix(inverse_inertia, body), _vector(spin, body)))
+        for axis in range(3):
+            twist[body, axis] = told[body, 7 + axis] if driven[body] else velocity[body, axis]
+            twist[body, 3 + axis] = told[body, 10 + axis] if driven[body] else omega[axis]
 
 
 @device
@@ -266,4 +311,5 @@ def _prescribed_pose(times, positions, quaternions, velocities, omegas, t, resul
 
 
 advance_bodies = compiled(_advance_bodies)
+present_twists = compiled(_present_twists)
 prescribed_pose = compiled(_prescribed_pose)
