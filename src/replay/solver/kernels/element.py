@@ -125,8 +125,9 @@ def total_deformation(reference, m):
 
 @device
 def turn_and_grow(rotation, q, k, rate):
-    """Hourglass force after the step: turned with the element, grown by stiffness times rate."""
-    return add_scaled(apply(rotation, q), k, rate)
+    """Hourglass force after the step: grown by stiffness times rate, half of it before the turn as in `elastic`."""
+    half = 0.5 * k
+    return add_scaled(apply(rotation, add_scaled(q, half, rate)), half, rate)
 
 
 def element(x, y, z, u, v, w, mass, reference, stress, hourglass, state, dt, p, control):
