@@ -22,12 +22,16 @@ FOAM = Material(
     "foam", "crushable_foam", 100.0,
     {"youngs_modulus_pa": 1e6, "plateau_stress_pa": 5e4, "densification_strain": 0.6, "rate_coefficient": 0.1},
 )  # fmt: skip
+PUTTY = Material(
+    "putty", "elastic_plastic", 1000.0,
+    {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3, "yield_stress_pa": 1e3, "hardening_modulus_pa": 1e4},
+)  # fmt: skip
 BONE = Material("bone", "rigid", 2000.0, {})
 
 
 @pytest.fixture
 def layered() -> Callable[..., Problem]:
-    """Return a builder of a column of all laws: rigid, fluid, tissue, foam, rubber, rigid."""
+    """Return a builder of a column of all laws: rigid, fluid, tissue, foam, rubber, putty, rigid."""
 
     def build(end: float = 5e-3, counts: tuple[int, int, int] = (12, 4, 4), **changes: Any) -> Problem:
         nodes, hexes = structured_block(counts, (0.012, 0.004, 0.004))
@@ -36,7 +40,8 @@ def layered() -> Callable[..., Problem]:
         nodes = nodes + 5e-5 * inner[:, None] * np.array([1.0, -0.7, 0.4])
         centre = nodes[hexes].mean(axis=1)[:, 0]
         element_part = np.minimum((centre / 0.002).astype(int), 5)
-        materials = (BONE, WATER, TISSUE, FOAM, RUBBER, BONE)
+        element_part[(centre > 0.009) & (centre < 0.010)] = 6
+        materials = (BONE, WATER, TISSUE, FOAM, RUBBER, BONE, PUTTY)
         parts = tuple(SolverPart(10 * (k + 1), f"{m.name}-{k}", m) for k, m in enumerate(materials))
         omega = np.array([20.0, -30.0, 40.0])
         fields: dict[str, Any] = {

@@ -54,10 +54,12 @@ def elastic_step(x, v, stress, hourglass, dt, mass, lame, shear, kappa, b1, b2):
     rate, spin = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
     eye = np.eye(3)
     turn = np.linalg.solve(eye - 0.5 * dt * spin, eye + 0.5 * dt * spin)
-    stress = turn @ stress @ turn.T + lame * dt * np.trace(rate) * eye + 2 * shear * dt * rate
+    half = 0.5 * dt * (lame * np.trace(rate) * eye + 2 * shear * rate)
+    stress = turn @ (stress + half) @ turn.T + half
     shapes = GAMMA - (GAMMA @ middle) @ b.T / volume
     stiffness = kappa * 2 * shear * (b**2).sum() / (16 * volume)
-    hourglass = hourglass @ turn.T + dt * stiffness * (shapes @ v)
+    grown = 0.5 * dt * stiffness * (shapes @ v)
+    hourglass = (hourglass + grown) @ turn.T + grown
     b_end, volume_end = mean_b(x)
     shapes_end = GAMMA - (GAMMA @ x) @ b_end.T / volume_end
     density = mass / volume_end

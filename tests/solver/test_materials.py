@@ -8,59 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from material_point import PARAMETERS, Point, turned
 
 from replay.errors import InputError
 from replay.solver import LAWS, Material, law_parameters
-from replay.solver.kernels.element import Motion
 
 SMALL = 1e-6
-IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-PARAMETERS: dict[str, dict[str, Any]] = {
-    "elastic": {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3},
-    "viscohyperelastic": {
-        "bulk_modulus_pa": 2e6, "shear_modulus_pa": 6e3, "prony_ratios": (0.5, 0.3), "prony_times_s": (0.01, 0.1),
-    },
-    "fluid": {"bulk_modulus_pa": 2e6, "shear_modulus_pa": 1e3},
-    "crushable_foam": {"youngs_modulus_pa": 1e6, "plateau_stress_pa": 1e5, "densification_strain": 0.6},
-}  # fmt: skip
-
-
-class Point:
-    """A material point driven by deformation gradients, in exactly the steps of the element."""
-
-    def __init__(self, law: str, **parameters: Any) -> None:
-        self.module = LAWS[law]
-        self.parameters = self.module.Parameters(**parameters)
-        self.constants = tuple(float(c) for c in self.parameters.constants())
-        self.stress = (0.0,) * 6
-        self.state = (0.0,) * max(len(self.module.STATE), 1)
-        self.moduli = (0.0, 0.0, 0.0)
-        self.f = np.eye(3)
-        self.work = 0.0
-
-    def to(self, f: Any, dt: float = 1e-4) -> np.ndarray:
-        f = np.asarray(f, float)
-        middle = 0.5 * (f + self.f)
-        gradient = (f - self.f) @ np.linalg.inv(middle)
-        rate, spin = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
-        turn = np.linalg.solve(np.eye(3) - 0.5 * spin, np.eye(3) + 0.5 * spin)
-        strain = (rate[0, 0], rate[1, 1], rate[2, 2], rate[0, 1], rate[1, 2], rate[2, 0])
-        motion = Motion(strain, tuple(map(tuple, turn)), tuple(map(tuple, f)), float(np.linalg.det(f)))
-        before = self.matrix()
-        self.stress, self.state, self.moduli = self.module.update(motion, self.stress, self.state, dt, self.constants)
-        self.work += 0.5 * float(((before + self.matrix()) * rate).sum()) * np.linalg.det(middle)
-        self.f = f
-        return self.matrix()
-
-    def matrix(self) -> np.ndarray:
-        xx, yy, zz, xy, yz, zx = self.stress
-        return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
-
-
-def turned(angle: float, axis: Any = (1.0, 2.0, -1.0)) -> np.ndarray:
-    a = np.asarray(axis) / np.linalg.norm(axis)
-    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
 
 
 @pytest.mark.parametrize("law", PARAMETERS)
@@ -118,7 +71,7 @@ def test_any_step_and_any_stretch_stay_finite(law: str, dt: float) -> None:
             assert np.isfinite(point.to(np.eye(3), dt)).all()
 
 
-@pytest.mark.parametrize("law", ["viscohyperelastic", "fluid", "crushable_foam"])
+@pytest.mark.parametrize("law", ["viscohyperelastic", "fluid", "crushable_foam", "elastic_plastic"])
 def test_closed_cycles_never_give_energy(law: str) -> None:
     rng = np.random.default_rng(5)
     for _ in range(6):
@@ -258,6 +211,10 @@ def test_parameters_say_their_unit_and_are_documented(law: str) -> None:
         ("elastic", {"poisson_ratio": 0.5}, "must lie between -1 and 0.5"),
         ("elastic", {"youngs_modulus_pa": "soft"}, "youngs_modulus_pa is 'soft'"),
         ("elastic", {"youngs_modulus_pa": float("nan")}, "youngs_modulus_pa is nan"),
+        ("elastic_plastic", {"yield_stress_pa": 0.0}, "yield_stress_pa is 0"),
+        ("elastic_plastic", {"curve_strains": [0.1, 0.2], "curve_stresses_pa": [4e4, 3e4]}, "must not fall"),
+        ("elastic_plastic", {"curve_strains": [0.0], "curve_stresses_pa": [4e4]}, "increase from above 0"),
+        ("elastic_plastic", {"poisson_ratio": 0.5}, "must lie between -1 and 0.5"),
         ("viscohyperelastic", {"prony_ratios": [0.6, 0.5]}, "sum must stay below 1"),
         ("viscohyperelastic", {"prony_times_s": [0.1]}, "as many of the one as of the other"),
         ("crushable_foam", {"curve_strains": [0.0, 0.5], "curve_stresses_pa": [0.0, -1.0]}, "must not fall"),

@@ -100,6 +100,15 @@ class ElementGroup:
         """Bring the elements to the end of a step of length `dt` [s] and write their nodal forces."""
         self._kernel(*self.kernel_arguments(nodal, dt))
 
+    def variable(self, name: str) -> NDArray[np.float64] | None:
+        """State variable of the law by name (n_blocks, LANES), if it keeps one."""
+        return self.state[:, self.law.STATE.index(name)] if name in self.law.STATE else None
+
+    @property
+    def reference_volume(self) -> NDArray[np.float64]:
+        """V0 (n_blocks, LANES) [m^3]."""
+        return self._reference[:, 0]
+
     def scatter(self, values: NDArray[np.float64], into: NDArray[np.float64]) -> None:
         """Write values of this group, (n_blocks, k, LANES) or (n_blocks, LANES), to the user's element rows."""
         filled = self.group.filled

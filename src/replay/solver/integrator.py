@@ -182,7 +182,7 @@ class Integrator:
         added = 0.0
         if velocities is not None and self.added_mass.total_kg > 0:
             added = 0.5 * float((self._added_mass * (velocities**2).sum(axis=1)).sum())
-        return self.ledger.energies(added)
+        return self.ledger.energies(added, self._plastic_work())
 
     def user_order(self, rows: NDArray[np.float64]) -> NDArray[np.float64]:
         """Bring nodal rows back to the user's order."""
@@ -203,6 +203,21 @@ class Integrator:
         result |= {f"bodies.{name}": array for name, array in self.bodies.arrays().items()}
         result |= {f"ledger.{name}": array for name, array in self.ledger.arrays().items()}
         return result
+
+    def variable(self, name: str) -> NDArray[np.float64]:
+        """State variable of the laws by name in the user's order (m,); zero where a law keeps none of that name."""
+        result = np.zeros(len(self.problem.hexes))
+        for group in self.groups:
+            if (values := group.variable(name)) is not None:
+                group.scatter(values, result)
+        return result
+
+    def _plastic_work(self) -> float:
+        total = 0.0
+        for group in self.groups:
+            if (density := group.variable("plastic_work_j_per_m3")) is not None:
+                total += float((density * group.reference_volume)[group.group.filled].sum())
+        return total
 
     def restore(self, arrays: dict[str, NDArray[np.float64]]) -> None:
         """Go back to what `arrays` returned; the next call must be `forces`."""

@@ -46,6 +46,8 @@ class Energies:
         Work of drivers, supports, loads and weight [J].
     added_mass_kinetic
         Share of `kinetic` that belongs to added mass [J].
+    plastic
+        Share of `internal` that plastic flow has turned into heat [J].
     integration
         Work of nodal forces on elements beyond that of stress, hourglass and viscosity [J].
     initial
@@ -64,6 +66,7 @@ class Energies:
     tie: float
     external_work: float
     added_mass_kinetic: float
+    plastic: float
     integration: float
     initial: float
 
@@ -136,8 +139,8 @@ class Ledger:
             after[4:] += taken
         self._after = after
 
-    def energies(self, added_mass_kinetic: float = 0.0) -> Energies:
-        """Ledger at the present time: the mean of the half steps around it."""
+    def energies(self, added_mass_kinetic: float = 0.0, plastic: float = 0.0) -> Energies:
+        """Ledger at the present time: the mean of the half steps around it, and the two shares that others know."""
         kinetic, absorbed, outside, tie, spring, damper, strap = (0.5 * (self._before + self._after)).tolist()
         stress, hourglass, viscosity = self.part_work.sum(axis=0).tolist()
         return Energies(
@@ -154,6 +157,7 @@ class Ledger:
             tie=0.0 - tie,
             external_work=outside,
             added_mass_kinetic=added_mass_kinetic,
+            plastic=plastic,
             integration=absorbed - stress - hourglass - viscosity,
             initial=self.initial,
         )

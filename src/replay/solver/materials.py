@@ -11,10 +11,12 @@ from types import ModuleType
 from typing import Any
 
 from replay.errors import InputError
-from replay.solver.kernels.materials import crushable_foam, elastic, fluid, rigid, viscohyperelastic
+from replay.solver.kernels.materials import crushable_foam, elastic, elastic_plastic, fluid, rigid, viscohyperelastic
 
 #: The registry: a new law is a file in `kernels.materials` and a name here.
-LAWS: dict[str, ModuleType] = {law.NAME: law for law in (elastic, viscohyperelastic, fluid, crushable_foam, rigid)}
+LAWS: dict[str, ModuleType] = {
+    law.NAME: law for law in (elastic, elastic_plastic, viscohyperelastic, fluid, crushable_foam, rigid)
+}
 
 
 @dataclass(frozen=True)

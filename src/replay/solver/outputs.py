@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.solver.materials import LAWS
 from replay.solver.problem import Problem
 from replay.solver.time_step import StepBound
 from replay.solver.view import StateView
@@ -43,6 +44,7 @@ ENERGY_TABLE = TableFormat(
         Column("strap_J", "work taken by straps: stored and lost, less what paying in brings"),
         Column("tie_J", "work taken by rigid and tied nodes: rounding"),
         Column("added_mass_kinetic_J", "share of the kinetic energy that belongs to added mass"),
+        Column("plastic_J", "share of the internal energy that plastic flow has turned into heat"),
         Column("integration_J", "work of nodal forces on elements beyond stress, hourglass and viscosity"),
         Column("total_J", "kinetic + internal + hourglass + viscosity + contact + friction + joints + straps + ties"),
         Column("ratio", "total over initial energy plus external work"),
@@ -90,6 +92,8 @@ HISTORY_TABLE = TableFormat(
 )
 POINT_FIELDS = {"displacement_m": 3, "velocity_m_per_s": 3}
 CELL_FIELDS = {"stress_Pa": 6, "von_mises_Pa": 1, "pressure_Pa": 1, "volume_ratio": 1}
+#: Written where a law keeps it.
+PLASTIC_STRAIN = "equivalent_plastic_strain"
 
 
 class Histories:
@@ -118,7 +122,7 @@ class Histories:
             [
                 view.time_s, e.kinetic, e.internal, e.hourglass, e.bulk_viscosity, e.contact_normal, e.friction,
                 e.external_work, e.joint_spring, e.joint_damper, e.strap, e.tie,
-                e.added_mass_kinetic, e.integration, e.total, e.ratio, e.closure,
+                e.added_mass_kinetic, e.plastic, e.integration, e.total, e.ratio, e.closure,
                 *view.momentum,
             ]
         )  # fmt: skip
@@ -177,9 +181,13 @@ class States:
     def __init__(self, problem: Problem, folder: Path, volume: NDArray[np.float64], *, resume_at: int | None) -> None:
         pid = np.array([part.pid for part in problem.parts])[problem.element_part]
         self._volume = volume
+        self._plastic = any(
+            PLASTIC_STRAIN in LAWS[part.material.law].STATE for part in problem.parts if not part.material.is_rigid
+        )
+        cells = CELL_FIELDS | ({PLASTIC_STRAIN: 1} if self._plastic else {})
         self._writer = StatesWriter(
             folder / "states.vtkhdf", problem.nodes, problem.hexes, problem.node_ids, problem.element_ids, pid,
-            POINT_FIELDS, CELL_FIELDS, resume=resume_at is not None,
+            POINT_FIELDS, cells, resume=resume_at is not None,
         )  # fmt: skip
         if resume_at is not None:
             self._writer.rewind(resume_at)
@@ -191,17 +199,17 @@ class States:
 
     def append(self, view: StateView) -> None:
         """Add a state."""
-        self._writer.append(
-            view.time_s,
-            {
-                "displacement_m": view.displacements,
-                "velocity_m_per_s": view.velocities,
-                "stress_Pa": view.stress,
-                "von_mises_Pa": view.von_mises,
-                "pressure_Pa": view.pressure,
-                "volume_ratio": view.volumes / self._volume,
-            },
-        )
+        fields = {
+            "displacement_m": view.displacements,
+            "velocity_m_per_s": view.velocities,
+            "stress_Pa": view.stress,
+            "von_mises_Pa": view.von_mises,
+            "pressure_Pa": view.pressure,
+            "volume_ratio": view.volumes / self._volume,
+        }
+        if self._plastic:
+            fields[PLASTIC_STRAIN] = view.variable(PLASTIC_STRAIN)
+        self._writer.append(view.time_s, fields)
 
     def sync(self) -> None:
         """Force the states onto the disk, before a checkpoint that counts them."""

@@ -80,6 +80,10 @@ class StateView:
         """Cauchy stress (m, 6), order xx, yy, zz, xy, yz, zx [Pa]; without bulk viscosity, zero in rigid parts."""
         return self._integrator.element_values("stress", 6)
 
+    def variable(self, name: str) -> NDArray[np.float64]:
+        """State variable of the material laws by name (m,); zero where a law keeps none of that name."""
+        return self._integrator.variable(name)
+
     @cached_property
     def volumes(self) -> NDArray[np.float64]:
         """Volumes (m,) [m^3]."""

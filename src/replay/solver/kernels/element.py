@@ -1,6 +1,6 @@
 """One element over one step: from nodal motion to nodal forces, state and stable time step.
 
-`element` is a template: the names `update` and `deformation` are bound to one material law by
+`element` is a template: the names `update`, `deformation` and `hold` are bound to one material law by
 `lanes.specialise`, so that each law compiles into its own straight line of arithmetic.
 """
 
@@ -78,6 +78,23 @@ class Moduli(NamedTuple):
     hourglass: float
 
 
+class YieldingModuli(NamedTuple):
+    """`Moduli` of a law that says ``HOURGLASS_YIELDS``.
+
+    Parameters
+    ----------
+    lame, shear, hourglass
+        As in `Moduli`.
+    flow_stress
+        Yield stress in tension [Pa]; limits the hourglass forces.
+    """
+
+    lame: float
+    shear: float
+    hourglass: float
+    flow_stress: float
+
+
 class Control(NamedTuple):
     """Numerical controls, the same for all elements of a run.
 
@@ -98,6 +115,7 @@ class Control(NamedTuple):
 # bound for each law by `lanes.compile_law`
 update: Callable[..., Any]
 deformation: Callable[..., Any]
+hold: Callable[..., Any]
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -125,8 +143,26 @@ def total_deformation(reference, m):
 
 @device
 def turn_and_grow(rotation, q, k, rate):
-    """Hourglass force after the step: turned with the element, grown by stiffness times rate."""
-    return add_scaled(apply(rotation, q), k, rate)
+    """Hourglass force after the step: grown by stiffness times rate, half of it before the turn as in `elastic`."""
+    half = 0.5 * k
+    return add_scaled(apply(rotation, add_scaled(q, half, rate)), half, rate)
+
+
+@device
+def elastic_hourglass(q, moduli, area):
+    """Hourglass force of a law that does not yield."""
+    return q
+
+
+@device
+def yielding_hourglass(q, moduli, area):
+    """Hourglass force returned to what the material can hold: ``|q| <= sigma_y A / 12``.
+
+    In a cube of face A bent by one mode, this force is that of a linear stress which reaches sigma_y at the face.
+    The return is radial, so it never gives energy.
+    """
+    most = moduli.flow_stress * area * (1.0 / 12.0)
+    return scale(most / max(most, math.sqrt(dot(q, q))), q)
 
 
 def element(x, y, z, u, v, w, mass, reference, stress, hourglass, state, dt, p, control):
@@ -183,14 +219,15 @@ def element(x, y, z, u, v, w, mass, reference, stress, hourglass, state, dt, p, 
     stiffness = control.hourglass_stiffness * per_modulus
     density = mass / volume
     soft_impedance = math.sqrt(2.0 * moduli.hourglass * density)
-    # |B| / sqrt(1.5) is the face area of a cube: the V^(2/3) of the usual form without a cube root
-    viscosity = control.hourglass_viscosity * soft_impedance * math.sqrt(norms[0] * (1.0 / 1.5)) * 0.25
+    # the face area of a cube: the V^(2/3) of the usual form without a cube root
+    area = math.sqrt(norms[0] * (1.0 / 1.5))
+    viscosity = control.hourglass_viscosity * soft_impedance * area * 0.25
     rates = hourglass_rates(middle, rate, velocity_gradient)
     k = stiffness * dt
-    h0 = turn_and_grow(rotation, hourglass[0], k, rates[0])
-    h1 = turn_and_grow(rotation, hourglass[1], k, rates[1])
-    h2 = turn_and_grow(rotation, hourglass[2], k, rates[2])
-    h3 = turn_and_grow(rotation, hourglass[3], k, rates[3])
+    h0 = hold(turn_and_grow(rotation, hourglass[0], k, rates[0]), moduli, area)
+    h1 = hold(turn_and_grow(rotation, hourglass[1], k, rates[1]), moduli, area)
+    h2 = hold(turn_and_grow(rotation, hourglass[2], k, rates[2]), moduli, area)
+    h3 = hold(turn_and_grow(rotation, hourglass[3], k, rates[3]), moduli, area)
     hourglass_forces = (
         add_scaled(h0, viscosity, rates[0]),
         add_scaled(h1, viscosity, rates[1]),

@@ -23,7 +23,13 @@ from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
 from replay.solver.kernels.device import compiled, device
-from replay.solver.kernels.element import element, no_deformation, total_deformation
+from replay.solver.kernels.element import (
+    elastic_hourglass,
+    element,
+    no_deformation,
+    total_deformation,
+    yielding_hourglass,
+)
 
 #: Elements of a block: two AVX-512 or four AVX2 registers a value; 64 is 15 % slower.
 LANES = 16
@@ -270,13 +276,14 @@ def compile_law(law: Any) -> Any:
     optimised once, alone.
     """
     kind = total_deformation if law.TOTAL_FORM else no_deformation
+    hold = yielding_hourglass if getattr(law, "HOURGLASS_YIELDS", False) else elastic_hourglass
     sizes = {
         "N_STATE": state_size(law),
         "STATE_SIZE": state_size(law) * LANES,
         "N_REFERENCE": reference_size(law),
         "N_PARAMETERS": law.N_CONSTANTS,
     }
-    physics = device(specialise(element, f"element_{law.NAME}", update=law.update, deformation=kind))
+    physics = device(specialise(element, f"element_{law.NAME}", update=law.update, deformation=kind, hold=hold))
     block = numba.njit(nogil=True, error_model="numpy")(
         specialise(block_forces, f"block_forces_{law.NAME}", physics=physics, **sizes)
     )

@@ -13,6 +13,8 @@ A law is a module with
     Whether the law looks at the deformation gradient.
 ``INITIAL_STRESS``
     Whether a run may begin with a stress, that is, whether the stress is a state of its own.
+``HOURGLASS_YIELDS``
+    Left out by laws whose hourglass forces are elastic; true where `update` returns `YieldingModuli`.
 ``N_CONSTANTS``
     How many numbers ``constants()`` gives.
 ``update(motion, stress, state, dt, p)``

@@ -1,4 +1,11 @@
-"""Linear isotropic elasticity in rate form: ``sigma <- R sigma R^T + lambda tr(D dt) I + 2 mu D dt``."""
+"""Linear isotropic elasticity in rate form.
+
+    sigma <- R (sigma + d/2) R^T + d/2,     d = lambda tr(D dt) I + 2 mu D dt
+
+D stands in the frame of mid-step. With half of its stress turned along, the update is of second order when a body
+turns while it deforms. With all of it added after the turn (Hughes and Winget 1980) it is of first order: half a per
+cent off for a body that turns by 0.02 rad a step, against 4e-5.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +13,7 @@ from dataclasses import dataclass
 
 from replay.solver.kernels.device import device
 from replay.solver.kernels.element import Moduli
-from replay.solver.kernels.tensors import add_scaled_sym, add_trace, congruence, trace
+from replay.solver.kernels.tensors import add_sym, add_trace, congruence, scale_sym, trace
 
 NAME = "elastic"
 STATE: tuple[str, ...] = ()
@@ -50,9 +57,14 @@ class Parameters:
 
 
 @device
+def elastic_step(motion, stress, lame, shear):
+    """Stress after an elastic step; exact for any rigid turn, of second order when turn and strain go together."""
+    half = add_trace(scale_sym(shear, motion.strain), 0.5 * lame * trace(motion.strain))
+    return add_sym(congruence(motion.rotation, add_sym(stress, half)), half)
+
+
+@device
 def update(motion, stress, state, dt, p):
-    """Stress after the step; the rotation is exact, the strain that of mid-step."""
+    """Stress after the step."""
     lame, shear = p
-    turned = congruence(motion.rotation, stress)
-    grown = add_scaled_sym(turned, 2.0 * shear, motion.strain)
-    return add_trace(grown, lame * trace(motion.strain)), state, Moduli(lame, shear, shear)
+    return elastic_step(motion, stress, lame, shear), state, Moduli(lame, shear, shear)

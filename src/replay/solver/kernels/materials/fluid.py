@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 from replay.solver.kernels.device import device
 from replay.solver.kernels.element import Moduli
-from replay.solver.kernels.tensors import add_scaled_sym, add_trace, congruence, deviator
+from replay.solver.kernels.materials.elastic import elastic_step
+from replay.solver.kernels.tensors import add_trace, deviator
 
 NAME = "fluid"
 STATE: tuple[str, ...] = ()
@@ -58,7 +59,7 @@ def update(motion, stress, state, dt, p):
     bulk, shear = p
     ratio = motion.volume_ratio
     inverse = 1.0 / ratio
-    shearing = deviator(add_scaled_sym(congruence(motion.rotation, stress), 2.0 * shear, motion.strain))
+    shearing = deviator(elastic_step(motion, stress, 0.0, shear))
     # d(mean stress)/d(ln J)
     tangent = 0.5 * bulk * (ratio + inverse)
     return (

@@ -1,0 +1,62 @@
+"""A material point driven along any path, in exactly the steps that the element takes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from replay.solver import LAWS
+from replay.solver.kernels.element import Motion
+
+#: Of every law that deforms: what the tests of all laws use.
+PARAMETERS: dict[str, dict[str, Any]] = {
+    "elastic": {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3},
+    "elastic_plastic": {
+        "youngs_modulus_pa": 1e6, "poisson_ratio": 0.3, "yield_stress_pa": 2e4, "hardening_modulus_pa": 1e4,
+    },
+    "viscohyperelastic": {
+        "bulk_modulus_pa": 2e6, "shear_modulus_pa": 6e3, "prony_ratios": (0.5, 0.3), "prony_times_s": (0.01, 0.1),
+    },
+    "fluid": {"bulk_modulus_pa": 2e6, "shear_modulus_pa": 1e3},
+    "crushable_foam": {"youngs_modulus_pa": 1e6, "plateau_stress_pa": 1e5, "densification_strain": 0.6},
+}  # fmt: skip
+
+
+class Point:
+    """A material point driven by deformation gradients, in exactly the steps of the element."""
+
+    def __init__(self, law: str, **parameters: Any) -> None:
+        self.module = LAWS[law]
+        self.parameters = self.module.Parameters(**parameters)
+        self.constants = tuple(float(c) for c in self.parameters.constants())
+        self.stress = (0.0,) * 6
+        self.state = (0.0,) * max(len(self.module.STATE), 1)
+        self.moduli = (0.0, 0.0, 0.0)
+        self.f = np.eye(3)
+        self.work = 0.0
+
+    def to(self, f: Any, dt: float = 1e-4) -> np.ndarray:
+        f = np.asarray(f, float)
+        middle = 0.5 * (f + self.f)
+        gradient = (f - self.f) @ np.linalg.inv(middle)
+        rate, spin = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
+        turn = np.linalg.solve(np.eye(3) - 0.5 * spin, np.eye(3) + 0.5 * spin)
+        strain = (rate[0, 0], rate[1, 1], rate[2, 2], rate[0, 1], rate[1, 2], rate[2, 0])
+        motion = Motion(strain, tuple(map(tuple, turn)), tuple(map(tuple, f)), float(np.linalg.det(f)))
+        before = self.matrix()
+        self.stress, self.state, self.moduli = self.module.update(motion, self.stress, self.state, dt, self.constants)
+        self.work += 0.5 * float(((before + self.matrix()) * rate).sum()) * np.linalg.det(middle)
+        self.f = f
+        return self.matrix()
+
+    def matrix(self) -> np.ndarray:
+        xx, yy, zz, xy, yz, zx = self.stress
+        return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+
+
+def turned(angle: float, axis: Any = (1.0, 2.0, -1.0)) -> np.ndarray:
+    a = np.asarray(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
