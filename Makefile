@@ -21,6 +21,8 @@ PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python
 UV := $(shell command -v uv 2>/dev/null)
 IN := source $(VENV)/bin/activate &&
 READY := $(VENV)/.ready
+# Two files of tests at a time; a file stays with one worker, which shares its fixtures.
+SIDE_BY_SIDE := -n 2 --dist loadfile
 
 .PHONY: run test quick check bench report lock clean distclean install
 .DEFAULT_GOAL := run
@@ -30,10 +32,10 @@ run: $(READY)
 	@$(IN) replay verdict results/$(PLAY)
 
 test: $(READY)
-	$(IN) pytest
+	$(IN) pytest $(SIDE_BY_SIDE)
 
 quick: $(READY)
-	$(IN) pytest -m "not slow"
+	$(IN) pytest -m "not slow" $(SIDE_BY_SIDE)
 
 check: $(READY)
 	$(IN) ruff check . && ruff format --check .
