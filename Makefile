@@ -17,7 +17,8 @@ RESOLUTION ?=
 OVERRIDES := $(if $(PLAYS),plays_folder=$(PLAYS)) $(if $(RESOLUTION),resolution=$(RESOLUTION))
 CONFIG := $(if $(strip $(OVERRIDES)),--config $(strip $(OVERRIDES)))
 VENV := .venv
-PYTHON ?= $(firstword $(shell command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
+# An activated .venv is about to be replaced: its python is not the one to build the next from.
+PYTHON ?= $(firstword $(shell PATH="$${PATH//$(CURDIR)\/.venv\/bin:/}" command -v python3.11 python3.12 python3.13 python3 2>/dev/null))
 UV := $(shell command -v uv 2>/dev/null)
 IN := source $(VENV)/bin/activate &&
 READY := $(VENV)/.ready
