@@ -14,6 +14,7 @@ import pytest
 
 from replay.bundle import compare, seal
 from replay.bundle.numbers import worst
+from replay.bundle.units import unit_of
 from replay.errors import BundleError, InputError
 from replay.manifest import Artifact, write_manifest
 
@@ -31,7 +32,7 @@ def test_two_equal_runs_are_identical_whatever_their_logs(tmp_path, sealed):
     assert by_path(result)["results/replay/run.log"].outcome == "not compared"
     assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "same"
     assert "README.md" in by_path(result)
-    assert result.text().startswith("the runs agree: ")
+    assert result.text() == "the runs agree: exact 33 same; tolerance 1 same; volatile 2 not compared"
 
 
 def test_a_difference_within_tolerance_agrees_but_is_not_identical(sealed):
@@ -64,6 +65,48 @@ def test_an_exact_artifact_may_not_differ_in_one_byte(tmp_path, sealed, source_r
     result = compare(sealed(), tmp_path / "demo.zip")
     assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "differs"
     assert not result.agree
+
+
+def test_the_first_artifact_to_differ_is_the_one_where_the_runs_parted(tmp_path, sealed, source_root):
+    """Not the first by name (a deck) nor the one that is farthest off (a history), but the earliest in the workflow."""
+    results = fabricate(tmp_path, shift=1e3)
+    for stage, name, reads in (
+        ("driver", "driver_6dof.csv", "reconstruction/kinematics.csv"),
+        ("decks", "a.csv", "driver/driver_6dof.csv"),
+    ):
+        (results / stage / name).write_text("time_s,ax_m_per_s2\n0.0,1.25\n")
+        inputs = {reads: results / reads}
+        write_manifest(results / stage, stage=stage, play="demo", artifacts=[Artifact.exact(name, "x")], inputs=inputs)
+    seal(results, tmp_path / "demo.zip", source_root=source_root)
+    result = compare(sealed(), tmp_path / "demo.zip")
+    assert result.first.path == "results/driver/driver_6dof.csv"
+    assert (
+        "first to differ, in the order of the workflow:\n  results/driver/driver_6dof.csv (exact): differs"
+        in result.text()
+    )
+    assert by_path(result)["results/replay/histories.csv"].worst.absolute == pytest.approx(1e3)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("line 5, alpha_x_rad_per_s2", "rad/s^2"),
+        ("line 5, x_m", "m"),
+        ("line 5, time_s", "s"),
+        ("solver.plot_interval_s", "s"),
+        ("nodes/coordinates_m[3, 1]", "m"),
+        ("momentum_x_N_s", "N s"),
+        ("inertia_kg_m2", "kg m^2"),
+        ("checks[3].rmse_percent_of_peak", ""),
+        ("delta_peak_percent", "%"),
+        ("rate_hz", "Hz"),
+        ("solver.time_step_factor", ""),
+        ("m", ""),
+        ("frames_per_s", ""),
+    ],
+)
+def test_a_difference_carries_the_unit_of_its_name(name, unit):
+    assert unit_of(name) == unit
 
 
 def test_another_source_is_told_but_what_it_made_is_compared(tmp_path, sealed):

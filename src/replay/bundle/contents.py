@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -87,7 +87,7 @@ class Run:
     play
         Name of the play.
     manifests
-        Stage to manifest, by name.
+        Stage to manifest, in the order of the workflow.
     items, left_out
         What goes into the bundle, and what does not.
     verdict
@@ -159,7 +159,27 @@ def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) ->
             mend="remove the folder and run the play again",
         )
     verdict, line = _verdict(results)
+    order = workflow_order({name: [i.path for i in manifest.inputs] for name, manifest in manifests.items()})
+    manifests = {name: manifests[name] for name in order}
     return Run(results.name, manifests, tuple(items), tuple(left), verdict, line, _failures(results, manifests))
+
+
+def workflow_order(read: Mapping[str, Sequence[str]]) -> list[str]:
+    """Order stages so that each comes after those it read from; stages that read nothing were never run and come last.
+
+    Parameters
+    ----------
+    read
+        Stage to the names of its inputs (``driver/driver_6dof.csv``).
+    """
+    order: list[str] = []
+    waiting = {name: {path.partition("/")[0] for path in paths} & set(read) - {name} for name, paths in read.items()}
+    while waiting:
+        ready = [name for name, before in waiting.items() if before <= set(order)]
+        first = min(ready or waiting, key=lambda name: (not read[name], name))
+        order.append(first)
+        del waiting[first]
+    return order
 
 
 def _item(path: str, folder: Path, artifact: Artifact) -> Item:
