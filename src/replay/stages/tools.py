@@ -38,7 +38,7 @@ def show_verdict(results: Path) -> int:
                 judged = read_gate(results / stage / file, limits)
                 found[judged.name] = judged
     print(f"\n{results.name}: {verdict['status'].upper()}\n")
-    for name, facts in limits.gates.items():
+    for name, facts in limits.protocol.items():
         gate = found.get(name)
         word = gate.verdict if gate else "not reached"
         print(f"  {_coloured(word):<20} {facts.title} [{name}]")
