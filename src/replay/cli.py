@@ -75,6 +75,16 @@ def _parser() -> argparse.ArgumentParser:
     compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
     compare.add_argument("old", type=Path)
     compare.add_argument("new", type=Path)
+    show = commands.add_parser("show", help="a bundle on one screen: play, verdict, gates, versions")
+    show.add_argument("bundle", type=Path, help="bundle, unpacked bundle or results/<play>")
+    table = commands.add_parser("table", help="many bundles in one table: CSV and HTML")
+    table.add_argument("bundles", type=Path, nargs="+", metavar="BUNDLE", help="results/*/bundle/*.zip")
+    table.add_argument("--out", type=Path, default=Path("plays"), metavar="NAME", help="writes NAME.csv, NAME.html")
+    agree = commands.add_parser("agree", help="do laboratories recover one driver from one play? exit 3 when not")
+    agree.add_argument(
+        "bundles", type=Path, nargs="+", metavar="BUNDLE", help="bundles or results folders, two or more"
+    )
+    agree.add_argument("--out", type=Path, metavar="FILE.json", help="also write all of it as JSON")
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
     synth.add_argument("kind", choices=["demo", "broadcast", "wearable"], help="which camera or sensor sees the impact")
@@ -142,12 +152,15 @@ def _run_stage(arguments: argparse.Namespace) -> int:
 
 
 def _run_tool(arguments: argparse.Namespace) -> int:
-    from replay.stages import explicit, tools
+    from replay.stages import agree, explicit, show, table, tools
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
         "verify": lambda: tools.verify_bundle(arguments.bundle),
         "compare": lambda: tools.compare_bundles(arguments.old, arguments.new),
+        "show": lambda: show.show(arguments.bundle),
+        "table": lambda: table.tabulate(arguments.bundles, arguments.out),
+        "agree": lambda: agree.agree(arguments.bundles, arguments.out),
         "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview

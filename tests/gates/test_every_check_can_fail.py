@@ -95,8 +95,6 @@ def agreement_with(check: str, value: float | bool, limits: Limits) -> Gate:
         values[check] = value
     elif check in quantities["angular velocity"]:
         quantities["angular velocity"][check] = value
-    elif check == "own_gate_passed":
-        laboratories["north"]["gates"]["reconstruction"] = value
     else:
         laboratories["north"][check] = value
     return agreement_gate(values, quantities, laboratories, limits)

@@ -122,6 +122,22 @@ def open_run(path: str | Path) -> Iterator[SealedRun]:
         yield SealedRun(path, sealed=True, files=files, fetch=fetch)
 
 
+@contextmanager
+def foreign_content(path: Path) -> Iterator[None]:
+    """Turn what goes wrong on reading files of another's making into one message: whoever sealed may write anything.
+
+    Raises
+    ------
+    BundleError
+        Where a file holds other things than a run of this kind.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, AttributeError, IndexError, ValueError) as error:
+        message = f"{path.name}: its files are not those of a run of this kind ({type(error).__name__}: {error})"
+        raise BundleError(message) from None
+
+
 def _listed(members: Members, row: dict[str, str]) -> Listed:
     name = bag.PAYLOAD + row["path"]
     if name not in members.sizes:

@@ -31,7 +31,9 @@ def unit_of(name: str) -> str:
 
 def _unit(parts: list[str]) -> str | None:
     """Write ``["rad", "per", "s2"]`` as rad/s^2, or None when it is no unit."""
-    above, below, under = [], [], False
+    above: list[str] = []
+    below: list[str] = []
+    under = False
     for part in parts:
         if part == "per" and not under:
             under = True

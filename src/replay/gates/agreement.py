@@ -46,15 +46,15 @@ def agreement_gate(
     quantities
         Quantity to the names of `QUANTITY_CHECKS`.
     laboratories
-        Laboratory to ``gates`` (gate to whether it did not fail there, or why it was not reached) and
+        Laboratory to ``own_gates_passed`` (or why that is not known), ``own_gates_passed_detail`` and
         ``limits_as_shipped``.
     limits
         As shipped: what two laboratories agree by is not set by one of them.
     """
     judge = Judge("agreement", limits)
     for name, laboratory in laboratories.items():
-        for gate, passed in laboratory["gates"].items():
-            judge.check("own_gate_passed", passed, of=f"{name}, {gate}")
+        detail = laboratory.get("own_gates_passed_detail", "")
+        judge.check("own_gates_passed", laboratory["own_gates_passed"], detail, of=name)
         judge.check("limits_as_shipped", laboratory["limits_as_shipped"], of=name)
     for name in (*INPUT_CHECKS, *MOTION_CHECKS):
         judge.check(name, values[name], values.get(f"{name}_detail", ""))

@@ -58,9 +58,10 @@ def rate(reference_time_s: ArrayLike, reference: ArrayLike, time_s: ArrayLike, v
         When they share fewer than 1 ms, or one of them is constant there.
     """
     t_reference, t_values = np.asarray(reference_time_s, dtype=float), np.asarray(time_s, dtype=float)
+    r, v = np.asarray(reference, dtype=float), np.asarray(values, dtype=float)
     start, end = max(t_reference[0], t_values[0]), min(t_reference[-1], t_values[-1])
     at = start + np.arange(int(np.floor((end - start) * RATE_HZ + 1e-6)) + 1) / RATE_HZ
-    return iso_18571(np.interp(at, t_reference, reference), np.interp(at, t_values, values))
+    return iso_18571(np.interp(at, t_reference, r), np.interp(at, t_values, v))
 
 
 def iso_18571(reference: ArrayLike, values: ArrayLike) -> Rating:
@@ -149,13 +150,13 @@ def _warp(x: NDArray[np.float64], y: NDArray[np.float64], width: int) -> tuple[N
         now[i + 1] = (x[i] - y[d - i]) ** 2 + (came.min(axis=0) if d else 0.0)
         choices.append((low, step))
         before, last = last, now
-    i, j = n - 1, n - 1
-    path = [(i, j)]
-    while i or j:
-        low, step = choices[i + j]
-        taken = int(step[i - low])
-        i, j = i - (taken != 1), j - (taken != 0)
-        path.append((i, j))
+    at_x, at_y = n - 1, n - 1
+    path = [(at_x, at_y)]
+    while at_x or at_y:
+        low, step = choices[at_x + at_y]
+        taken = int(step[at_x - low])
+        at_x, at_y = at_x - (taken != 1), at_y - (taken != 0)
+        path.append((at_x, at_y))
     found = np.array(path[::-1], dtype=np.int64)
     return found[:, 0], found[:, 1]
 
