@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from replay import __version__
 from replay.errors import ReplayError
@@ -69,22 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     verdict = commands.add_parser("verdict", help="print the verdict of a finished run; exit 3 when it is rejected")
     verdict.add_argument("results", type=Path, help="results/<play>")
 
-    verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
-    verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
-
-    compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
-    compare.add_argument("old", type=Path)
-    compare.add_argument("new", type=Path)
-    show = commands.add_parser("show", help="a bundle on one screen: play, verdict, gates, versions")
-    show.add_argument("bundle", type=Path, help="bundle, unpacked bundle or results/<play>")
-    table = commands.add_parser("table", help="many bundles in one table: CSV and HTML")
-    table.add_argument("bundles", type=Path, nargs="+", metavar="BUNDLE", help="results/*/bundle/*.zip")
-    table.add_argument("--out", type=Path, default=Path("plays"), metavar="NAME", help="writes NAME.csv, NAME.html")
-    agree = commands.add_parser("agree", help="do laboratories recover one driver from one play? exit 3 when not")
-    agree.add_argument(
-        "bundles", type=Path, nargs="+", metavar="BUNDLE", help="bundles or results folders, two or more"
-    )
-    agree.add_argument("--out", type=Path, metavar="FILE.json", help="also write all of it as JSON")
+    _add_bundle_tools(commands)
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
     synth.add_argument("kind", choices=["demo", "broadcast", "wearable"], help="which camera or sensor sees the impact")
@@ -116,6 +102,39 @@ def _parser() -> argparse.ArgumentParser:
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
     schema.add_argument("--out", type=Path, help="write it to a file instead")
     return parser
+
+
+_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree")
+
+
+def _add_bundle_tools(commands: Any) -> None:
+    """Commands for whoever received a bundle."""
+    verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
+    verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
+
+    compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
+    compare.add_argument("old", type=Path)
+    compare.add_argument("new", type=Path)
+    show = commands.add_parser("show", help="a bundle on one screen: play, verdict, gates, versions")
+    show.add_argument("bundle", type=Path, help="bundle, unpacked bundle or results/<play>")
+    table = commands.add_parser("table", help="many bundles in one table: CSV and HTML")
+    table.add_argument("bundles", type=Path, nargs="+", metavar="BUNDLE", help="results/*/bundle/*.zip")
+    table.add_argument("--out", type=Path, default=Path("plays"), metavar="NAME", help="writes NAME.csv, NAME.html")
+    agree = commands.add_parser("agree", help="do laboratories recover one driver from one play? exit 3 when not")
+    agree.add_argument(
+        "bundles", type=Path, nargs="+", metavar="BUNDLE", help="bundles or results folders, two or more"
+    )
+    agree.add_argument("--out", type=Path, metavar="FILE.json", help="also write all of it as JSON")
+
+
+def _run_bundle_tool(arguments: argparse.Namespace) -> int:
+    import importlib
+
+    # One module a command, so that verifying loads no solver.
+    module = "bundles" if arguments.command in ("verify", "compare") else arguments.command
+    tool = getattr(importlib.import_module(f"replay.stages.{module}"), arguments.command)
+    given = {name: value for name, value in vars(arguments).items() if name != "command"}
+    return tool(**given)
 
 
 def _add_workspace(command: argparse.ArgumentParser) -> None:
@@ -152,15 +171,10 @@ def _run_stage(arguments: argparse.Namespace) -> int:
 
 
 def _run_tool(arguments: argparse.Namespace) -> int:
-    from replay.stages import agree, explicit, show, table, tools
+    from replay.stages import explicit, tools
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
-        "verify": lambda: tools.verify_bundle(arguments.bundle),
-        "compare": lambda: tools.compare_bundles(arguments.old, arguments.new),
-        "show": lambda: show.show(arguments.bundle),
-        "table": lambda: table.tabulate(arguments.bundles, arguments.out),
-        "agree": lambda: agree.agree(arguments.bundles, arguments.out),
         "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview
@@ -196,6 +210,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             from replay.doctor import examine
 
             return examine()
+        if arguments.command in _BUNDLE_TOOLS:
+            return _run_bundle_tool(arguments)
         return _run_stage(arguments) if arguments.command in _STAGES else _run_tool(arguments)
     except ReplayError as error:
         print(f"replay {arguments.command}: {error}", file=sys.stderr)

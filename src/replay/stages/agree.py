@@ -68,12 +68,12 @@ class Laboratory:
         }
 
 
-def agree(paths: Sequence[Path], out: Path | None = None) -> int:
+def agree(bundles: Sequence[Path], out: Path | None = None) -> int:
     """Compare every pair of digitisations of one play, print them side by side and say whether they agree.
 
     Parameters
     ----------
-    paths
+    bundles
         Bundles, unpacked bundles or results folders; results up to stage ``drive`` suffice.
     out
         JSON file for all of it.
@@ -83,9 +83,9 @@ def agree(paths: Sequence[Path], out: Path | None = None) -> int:
     int
         0 when every pair is accepted, 3 when one is refused.
     """
-    if len(paths) < 2:
-        raise InputError(paths[0], "is one bundle alone", expected="two or more", mend="name the other laboratory's")
-    laboratories = [_read(path, name) for path, name in zip(paths, _names(paths))]
+    if len(bundles) < 2:
+        raise InputError(bundles[0], "is one bundle alone", expected="two or more", mend="name the other laboratory's")
+    laboratories = [_read(path, name) for path, name in zip(bundles, _names(bundles))]
     print(_side_by_side(laboratories))
     pairs = [(one, other, *_judge(one, other)) for one, other in combinations(laboratories, 2)]
     for _, _, found, gate in pairs:

@@ -12,9 +12,9 @@ _MEASURES = (("peak_linear_acceleration", "m/s^2"), ("peak_angular_velocity", "r
 _WIDTH = 15
 
 
-def show(path: Path) -> int:
+def show(bundle: Path) -> int:
     """Print play, verdict, gates and versions; every file that is read is checked against the manifest first."""
-    with foreign_content(path), open_run(path) as run:
+    with foreign_content(bundle), open_run(bundle) as run:
         print("\n".join(shown(line) for line in _lines(run)))
     return 0
 

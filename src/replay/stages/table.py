@@ -53,12 +53,12 @@ PLAYS = TableFormat(
 """Format of the CSV table of `replay table`."""
 
 
-def tabulate(paths: Sequence[Path], out: Path) -> int:
+def table(bundles: Sequence[Path], out: Path) -> int:
     """Write ``<out>.csv`` and ``<out>.html``, a row a bundle; one that cannot be read has its reason instead.
 
     Parameters
     ----------
-    paths
+    bundles
         Bundles, unpacked bundles or results folders.
     out
         Name of both files, without suffix.
@@ -68,7 +68,7 @@ def tabulate(paths: Sequence[Path], out: Path) -> int:
     int
         0, or 1 when a bundle could not be read.
     """
-    rows = [_row(path) for path in paths]
+    rows = [_row(path) for path in bundles]
     columns = {column.name: [row.get(column.name, _empty(column)) for row in rows] for column in PLAYS.columns}
     PLAYS.write(out.with_name(out.name + ".csv"), columns)
     write_text(out.with_name(out.name + ".html"), overview_page(rows))

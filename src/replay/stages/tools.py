@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import cast
 
-from replay import bundle, models
+from replay import models
 from replay.errors import InputError
 from replay.files import read_json, write_text
 from replay.gates import Gate, Limits, read_gate
@@ -57,19 +57,6 @@ def show_verdict(results: Path) -> int:
 
 def _coloured(word: str) -> str:
     return f"\033[{_COLOURS[word]}m{word}\033[0m" + " " * (11 - len(word)) if sys.stdout.isatty() else word
-
-
-def verify_bundle(path: Path) -> int:
-    """Verify a bundle and say what was verified; a bad one raises, naming its first bad file."""
-    print(bundle.verify(path).text())
-    return 0
-
-
-def compare_bundles(old: Path, new: Path) -> int:
-    """Compare two runs; 0 when they agree, each artifact by its class."""
-    comparison = bundle.compare(old, new)
-    print(comparison.text())
-    return 0 if comparison.agree else 1
 
 
 def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
