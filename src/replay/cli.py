@@ -104,7 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree")
+_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree", "rerun")
 
 
 def _add_bundle_tools(commands: Any) -> None:
@@ -125,6 +125,13 @@ def _add_bundle_tools(commands: Any) -> None:
         "bundles", type=Path, nargs="+", metavar="BUNDLE", help="bundles or results folders, two or more"
     )
     agree.add_argument("--out", type=Path, metavar="FILE.json", help="also write all of it as JSON")
+    rerun = commands.add_parser("rerun", help="make a bundle again from itself alone, and compare")
+    rerun.add_argument("bundle", type=Path)
+    rerun.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for all of it")
+    rerun.add_argument("--yes", action="store_true", help="do not ask before running what came with the bundle")
+    rerun.add_argument("--environment", type=Path, metavar="VENV", help="use this environment, not the bundle's lock")
+    rerun.add_argument("--withheld", type=Path, metavar="FOLDER", help="has the files the bundle names by hash alone")
+    rerun.add_argument("--cores", type=_positive, help="for the workflow (default: all)")
 
 
 def _run_bundle_tool(arguments: argparse.Namespace) -> int:

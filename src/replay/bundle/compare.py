@@ -42,6 +42,11 @@ class Difference:
     outcome: Outcome
     worst: Apart | None = None
 
+    @property
+    def kind(self) -> str:
+        """Class of the artifact, or provenance: where a run came from, told when it differs but not compared."""
+        return "provenance" if self.outcome == "not compared" and self.class_ != "volatile" else self.class_
+
     def sentence(self) -> str:
         """Say it in one line."""
         text = f"{self.path} ({self.class_}): {self.outcome}"
@@ -93,8 +98,8 @@ class Comparison:
     def text(self) -> str:
         """Say it in a few lines: the counts by class, where the runs parted, then all that is not the same."""
         counts = []
-        for kind in ("exact", "tolerance", "volatile"):
-            found = Counter(d.outcome for d in self.differences if d.class_ == kind)
+        for kind in ("exact", "tolerance", "provenance", "volatile"):
+            found = Counter(d.outcome for d in self.differences if d.kind == kind)
             counts += [f"{kind} " + ", ".join(f"{found[o]} {o}" for o in _ORDER if found[o])] if found else []
         lines = [f"the runs {'agree' if self.agree else 'differ'}: {'; '.join(counts)}"]
         if self.first:
