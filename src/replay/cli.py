@@ -61,6 +61,12 @@ def _parser() -> argparse.ArgumentParser:
                 action="store_true",
                 help="record a failed gate, let later stages skip themselves, exit 0: rejected plays are sealed too",
             )
+        if name == "seal":
+            command.add_argument(
+                "--interrupted",
+                action="store_true",
+                help="seal what there is of a run that did not come to its end; the bundle says so",
+            )
         if name in _SOLVING:
             command.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
             command.add_argument(
@@ -168,6 +174,8 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     options: dict[str, object] = {}
     if arguments.command == "settings":
         options["resolution"] = None if arguments.resolution == "as-the-play-says" else arguments.resolution
+    if arguments.command == "seal":
+        options["interrupted"] = arguments.interrupted
     if arguments.command in _SOLVING:
         options |= {"threads": arguments.threads, "checkpoint_every_s": arguments.checkpoint_every}
     refusal = module.run(workspace, **options)

@@ -357,6 +357,11 @@ class Play(Setting):
         description="Limits this play sets itself, `gate.check: number` or `gate.check: {fail_above: number}`; "
         "a looser one is reported as loosened.",
     )
+    withhold: dict[str, str] = Field(
+        default_factory=dict,
+        description="Files of the play's folder whose bytes may not be shared, `video.mp4: why`: the bundle has "
+        "hash and reason instead.",
+    )
     _folder: Path = PrivateAttr(default=Path())
 
     @property
@@ -378,6 +383,19 @@ class Play(Setting):
     def files(self) -> tuple[Path, ...]:
         """Every raw file the play names, in a fixed order."""
         return tuple(self.file(name) for name in self.source.files)
+
+    @field_validator("withhold")
+    @classmethod
+    def _are_there(cls, value: dict[str, str], info: ValidationInfo) -> dict[str, str]:
+        folder = (info.context or {}).get("folder")
+        for name, reason in value.items():
+            if not reason.strip():
+                refuse(
+                    f"{name} is withheld for no reason", "one clause that says why", "write the reason after the name"
+                )
+            if name == "play.yaml" or (folder is not None and not (Path(folder) / name).is_file()):
+                refuse(f"{name!r} cannot be withheld", "a file beside play.yaml", "correct the name")
+        return value
 
     @field_validator("name")
     @classmethod

@@ -91,7 +91,8 @@ class Run:
     items, left_out
         What goes into the bundle, and what does not.
     verdict
-        ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, or ``NOT JUDGED`` for a run without verdict.
+        ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, ``INTERRUPTED`` for a run that did not come to
+        its end, or ``NOT JUDGED`` for one without a verdict.
     line
         The verdict in one line.
     failures
@@ -107,7 +108,7 @@ class Run:
     failures: dict[str, str]
 
 
-def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) -> Run:
+def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None, unfinished: Sequence[str] = ()) -> Run:
     """Read a results folder, checking every file against its stage's manifest.
 
     Parameters
@@ -116,6 +117,8 @@ def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) ->
         ``results/<play>``: one folder a stage, each with its manifest.
     withhold
         Payload path to the reason why its bytes may not be shared; hash and reason go in instead.
+    unfinished
+        Stages that the run did not come to: the verdict is then ``INTERRUPTED``, whatever an older one said.
 
     Raises
     ------
@@ -158,7 +161,7 @@ def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) ->
             expected=f"stages of {results.name} alone",
             mend="remove the folder and run the play again",
         )
-    verdict, line = _verdict(results)
+    verdict, line = _verdict(results, unfinished)
     order = workflow_order({name: [i.path for i in manifest.inputs] for name, manifest in manifests.items()})
     manifests = {name: manifests[name] for name in order}
     return Run(results.name, manifests, tuple(items), tuple(left), verdict, line, _failures(results, manifests))
@@ -213,7 +216,9 @@ def _unlisted(folder: Path, prefix: str, manifest: StageManifest) -> list[LeftOu
     return [LeftOut(path, reason) for path, reason in left.items()]
 
 
-def _verdict(results: Path) -> tuple[str, str]:
+def _verdict(results: Path, unfinished: Sequence[str]) -> tuple[str, str]:
+    if unfinished:
+        return "INTERRUPTED", f"{results.name}: the run ended before {', '.join(unfinished)}; nothing was judged"
     path = results / "verdict" / "verdict.json"
     if not path.is_file():
         return "NOT JUDGED", "the run ended before its verdict"

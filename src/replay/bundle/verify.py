@@ -41,7 +41,8 @@ class VerifyReport:
     path
         The archive or folder.
     play, verdict, line
-        As sealed; the verdict is ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED`` or ``NOT JUDGED``.
+        As sealed; the verdict is ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, ``INTERRUPTED`` or
+        ``NOT JUDGED``.
     files, bytes
         Number and size of the payload's files.
     sha256
