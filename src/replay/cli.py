@@ -110,13 +110,14 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree", "rerun")
+_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree", "rerun", "sign")
 
 
 def _add_bundle_tools(commands: Any) -> None:
     """Commands for whoever received a bundle."""
     verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
     verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
+    verify.add_argument("--signers", type=Path, metavar="FILE", help="also check its signature (allowed signers)")
 
     compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
     compare.add_argument("old", type=Path)
@@ -138,13 +139,16 @@ def _add_bundle_tools(commands: Any) -> None:
     rerun.add_argument("--environment", type=Path, metavar="VENV", help="use this environment, not the bundle's lock")
     rerun.add_argument("--withheld", type=Path, metavar="FOLDER", help="has the files the bundle names by hash alone")
     rerun.add_argument("--cores", type=_positive, help="for the workflow (default: all)")
+    sign = commands.add_parser("sign", help="sign a bundle with an SSH key; the signature lies beside it")
+    sign.add_argument("bundle", type=Path)
+    sign.add_argument("--key", type=Path, required=True, help="private SSH key")
 
 
 def _run_bundle_tool(arguments: argparse.Namespace) -> int:
     import importlib
 
     # One module a command, so that verifying loads no solver.
-    module = "bundles" if arguments.command in ("verify", "compare") else arguments.command
+    module = "bundles" if arguments.command in ("verify", "compare", "sign") else arguments.command
     tool = getattr(importlib.import_module(f"replay.stages.{module}"), arguments.command)
     given = {name: value for name, value in vars(arguments).items() if name != "command"}
     return tool(**given)

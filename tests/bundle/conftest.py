@@ -120,6 +120,7 @@ def fabricate_source(root: Path) -> Path:
     files = {
         "Snakefile": "rule all:\n    input: []\n",
         "environment.lock": "numpy==2.0.0\n",
+        "pyproject.toml": "[project]\n",
         "CITATION.cff": "cff-version: 1.2.0\n",
         "config/config.yaml": "plays: [demo]\n",
         "workflow/rules/replay.smk": "rule impact:\n    shell: 'replay impact'\n",

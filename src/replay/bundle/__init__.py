@@ -5,6 +5,7 @@ from replay.bundle.names import shown
 from replay.bundle.package import package_facts
 from replay.bundle.seal import seal
 from replay.bundle.sealed import SealedRun, foreign_content, open_run
+from replay.bundle.signature import sign, signature_path, signer_of
 from replay.bundle.verify import VerifyReport, verify
 
 __all__ = [
@@ -18,5 +19,8 @@ __all__ = [
     "package_facts",
     "seal",
     "shown",
+    "sign",
+    "signature_path",
+    "signer_of",
     "verify",
 ]
