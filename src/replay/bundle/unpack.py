@@ -69,7 +69,7 @@ def _snapshot(run: SealedRun) -> Iterator[tarfile.TarFile]:
     try:
         with tarfile.open(run.file(_SNAPSHOT), mode="r:", errorlevel=2) as tar:
             yield tar
-    except tarfile.TarError as error:
+    except (tarfile.TarError, ValueError, OverflowError) as error:
         raise _refuse(run, f"is no tar archive that can be read ({error})") from None
 
 

@@ -17,7 +17,7 @@ from replay.bundle import SealedRun, compare, foreign_content, open_run, shown, 
 from replay.bundle.unpack import find_withheld, source_files, unpack_play, unpack_source
 from replay.errors import BundleError, InputError, ReplayError
 
-_PLAY = re.compile(r"[a-z0-9_-]+")
+_PLAY = re.compile(r"[a-z0-9_][a-z0-9_-]*")
 _RESOLUTION = re.compile(r"[a-z]+")
 # Of this process's environment, what the run again may see: nothing that names another Python or another source.
 _HIDDEN = ("PYTHONPATH", "PYTHONHOME", "PYTHONSTARTUP", "VIRTUAL_ENV", "CONDA_PREFIX")

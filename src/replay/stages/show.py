@@ -10,6 +10,7 @@ from replay.bundle import SealedRun, foreign_content, open_run, shown
 
 _MEASURES = (("peak_linear_acceleration", "m/s^2"), ("peak_angular_velocity", "rad/s"), ("HIC15", ""), ("BrIC", ""))
 _WIDTH = 15
+INTERRUPTED = "INTERRUPTED"
 
 
 def show(bundle: Path) -> int:
@@ -27,6 +28,8 @@ def _lines(run: SealedRun) -> Iterator[str]:
     yield f"{play.get('name') or bundle.get('play', run.path.name)}: {status}"
     if play.get("title"):
         yield f"  {play['title']}"
+    if status == INTERRUPTED:
+        verdict = {}  # an older one, from before stages were run again
     if not verdict:
         yield f"  {bundle.get('line') or 'the run ended before its verdict'}"
     yield from _facts(run, play)

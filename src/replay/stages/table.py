@@ -12,6 +12,7 @@ from replay.bundle import SealedRun, foreign_content, open_run, shown
 from replay.errors import ReplayError
 from replay.files import write_text
 from replay.report import overview_page
+from replay.stages.show import INTERRUPTED
 from replay.tables import Column, TableFormat
 
 UNREADABLE = "UNREADABLE"
@@ -96,6 +97,8 @@ def _verdict(run: SealedRun) -> dict[str, Any]:
     bundle = run.json("bundle.json") or {}
     verdict = run.json("results/verdict/verdict.json") or {}
     play = run.json("results/settings/play.json") or {}
+    if bundle.get("verdict") == INTERRUPTED:
+        verdict = {}
     causes = verdict.get("causes", [])
     failed = [f"{cause['gate']}.{cause['sentence']}" for cause in causes if cause["verdict"] == "fail"]
     warned = [f"{cause['gate']}.{cause['sentence']}" for cause in causes if cause["verdict"] == "warn"]
