@@ -201,6 +201,35 @@ def test_arrays_are_compared_entry_by_entry():
     assert (missing.where, missing.old, missing.new) == ("group/x", "there", "missing")
 
 
+def test_large_datasets_are_compared_block_by_block_and_the_index_is_that_of_the_whole(monkeypatch):
+    monkeypatch.setattr("replay.bundle.numbers._BLOCK_VALUES", 30)
+    values = np.arange(300.0).reshape(100, 3)
+    other = values.copy()
+    other[77, 2] += 0.5
+    other[13, 0] += 0.25
+    found = apart("a.h5", hdf(x=values), hdf(x=other))
+    assert (found.where, found.absolute) == ("group/x[77, 2]", 0.5)
+    assert apart("a.h5", hdf(x=np.empty((0, 3))), hdf(x=np.empty((0, 3)))) is None
+    assert apart("a.h5", hdf(x=np.float64(1.0)), hdf(x=np.float64(2.0))).where == "group/x"
+
+
+def test_of_an_exact_table_the_worst_entry_is_the_one_farthest_off_beside_its_column():
+    """Not the first to differ, nor the greatest number: a pressure of 1e5 Pa that moves by 1 has hardly moved."""
+    old = b"time_s,p_Pa,x_m\n0,100000,0.001\n1,100000,0.002\n"
+    new = b"time_s,p_Pa,x_m\n0,100001,0.001\n1,100000,0.003\n"
+    assert apart("a.csv", old, new).where == "line 3, x_m"
+    assert apart(
+        "a.h5", hdf(p=np.full(3, 1e5), x=np.ones(3)), hdf(p=np.full(3, 1e5) + 1, x=np.ones(3) + 0.1)
+    ).where == ("group/x[0]")
+
+
+def test_texts_beside_numbers_are_compared_too():
+    names = np.array([b"brain", b"skull"])
+    assert apart("a.h5", hdf(n=names, x=np.ones(2)), hdf(n=names, x=np.ones(2))) is None
+    assert apart("a.h5", hdf(n=names), hdf(n=names[::-1])).where == "group/n"
+    assert apart("a.csv", b"part,x\nbrain,1\n", b"part,x\nskull,1\n").where == "line 2, part"
+
+
 def test_the_order_of_keys_is_part_of_a_json_file():
     found = apart("a.json", json.dumps({"a": 1, "b": 2}).encode(), json.dumps({"b": 2, "a": 1}).encode())
     assert found.where == "(keys)"
