@@ -1,7 +1,7 @@
 """The command line: one sub-command a stage, and the only place that parses arguments.
 
-Exit codes: 0 done, 1 a bundle that does not verify or a run that could not go on, 2 an input that cannot be
-used, 3 a gate that refuses the play.
+Exit codes: 0 done, 1 a bundle that does not verify, runs that differ or a run that could not go on, 2 an input
+that cannot be used, 3 a gate that refuses the play.
 """
 
 from __future__ import annotations
