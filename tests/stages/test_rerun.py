@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import json
 import stat
 import subprocess
 import sys
@@ -257,3 +258,25 @@ def test_an_interrupted_run_is_sealed_on_request_and_says_what_it_did_not_come_t
     assert "pass  shake" in said
     assert main(["table", str(bundle), "--out", str(tmp_path / "plays")]) == 0
     assert ',INTERRUPTED,"demo: the run ended before replay' in (tmp_path / "plays.csv").read_text()
+
+
+def test_what_the_play_withholds_is_sealed_by_hash_alone(interrupted, tmp_path, capsys):
+    results = tmp_path / "results/demo"
+    settings = json.loads((results / "settings/play.json").read_text())
+    settings["withhold"] = {"video.mp4": "belongs to the league", "kinovea_clicks.csv": "not ours"}
+    (tmp_path / "plays/demo/kinovea_clicks.csv").write_text("clicks")
+    film = bytes(range(128, 256)) * 3
+    (tmp_path / "plays/demo/video.mp4").write_bytes(film)
+    write_json(results / "settings/play.json", settings)
+    artifacts = [Artifact.exact("play.json", "x")]
+    write_manifest(results / "settings", stage="settings", play="demo", artifacts=artifacts)
+    assert interrupted("--interrupted") == 0
+    bundle = results / "bundle/demo.zip"
+    data = bundle.read_bytes()
+    assert film not in data
+    assert b"demo/data/results/inputs/kinovea_clicks.csv" not in data
+    capsys.readouterr()
+    assert main(["show", str(bundle)]) == 0
+    said = capsys.readouterr().out
+    assert f"plays/demo/video.mp4 (belongs to the league), sha256 {hashlib.sha256(film).hexdigest()[:12]}" in said
+    assert "results/inputs/kinovea_clicks.csv (not ours)" in said

@@ -84,11 +84,12 @@ def seal(
     if unknown := set(metadata) - {"author", "publisher", "license", "date"}:
         message = f"metadata {sorted(unknown)} unknown"
         raise ValueError(message)
-    source = read_source(source_root if source_root is not None else Path(__file__).resolve().parents[3])
     plays, left_plays = _play_items(play_folder, withhold)
     of_results = {name: reason for name, reason in withhold.items() if not name.startswith("plays/")}
     run = gather(results, withhold=of_results, unfinished=unfinished)
     run = replace(run, left_out=(*run.left_out, *left_plays))
+    root = source_root if source_root is not None else Path(__file__).resolve().parents[3]
+    source = read_source(root, without=frozenset(left.sha256 for left in run.left_out if left.sha256))
     jobs = read_jobs(job_records, run.play)
     destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=destination.parent, prefix=".sealing.") as folder:

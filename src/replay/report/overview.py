@@ -59,7 +59,7 @@ def overview_page(rows: Sequence[Mapping[str, Any]]) -> str:
         "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{len(rows)} plays</title>\n<style>\n{css}main, header .inner, footer {{ max-width: 100rem; }}\n"
-        "td:nth-last-child(2) { min-width: 16rem; }\n</style></head>\n<body>"
+        "tbody th, td:nth-last-child(2) { min-width: 12rem; overflow-wrap: anywhere; }\n</style></head>\n<body>"
         '<header><div class="inner"><p class="kicker">Finite-element replays of single plays</p>'
         f"<h1>{len(rows)} plays</h1><p>{text(summary)}</p></div></header>\n"
         f"<main>{section('plays', 'Plays', body)}</main>\n"

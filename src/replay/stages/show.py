@@ -10,6 +10,7 @@ from replay.bundle import SealedRun, foreign_content, open_run, shown
 
 _MEASURES = (("peak_linear_acceleration", "m/s^2"), ("peak_angular_velocity", "rad/s"), ("HIC15", ""), ("BrIC", ""))
 _WIDTH = 15
+_MOST = 100
 INTERRUPTED = "INTERRUPTED"
 
 
@@ -81,11 +82,15 @@ def _gates(run: SealedRun, verdict: Mapping[str, Any]) -> Iterator[str]:
     for name, word in gates.items():
         extra = f"{powerless[name]} not checked, for want of power" if name in powerless else ""
         yield f"  {word:<5} {name:<{width}}  {extra}".rstrip()
-        yield from (f"        {text}" for text in causes.get(name, ()))
+        yield from (f"        {_short(text)}" for text in causes.get(name, ()))
     if verdict.get("not_evaluated"):
         yield f"  not reached: {', '.join(verdict['not_evaluated'])}"
     for entry in verdict.get("loosened", []):
         yield f"  LOOSENED {entry['gate']}.{entry['check']}: {entry['limit']} instead of {entry['instead_of']}"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _MOST else f"{text[:_MOST]} ..."
 
 
 def recorded_gates(run: SealedRun) -> dict[str, str]:
