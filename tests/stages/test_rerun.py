@@ -248,7 +248,7 @@ def interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[...
 
 def test_an_interrupted_run_is_sealed_on_request_and_says_what_it_did_not_come_to(interrupted, tmp_path, capsys):
     assert interrupted() == 2
-    assert "replay solve" in capsys.readouterr().err
+    assert "replay impact" in capsys.readouterr().err
     assert interrupted("--interrupted") == 0
     assert "INTERRUPTED, sealed and verified" in capsys.readouterr().out
     bundle = tmp_path / "results/demo/bundle/demo.zip"
