@@ -52,7 +52,7 @@ class Difference:
         text = f"{self.path} ({self.class_}): {self.outcome}"
         if self.worst is None:
             return text
-        unit = self.unit or unit_of(self.worst.where)
+        unit = "" if math.isnan(self.worst.absolute) else self.unit or unit_of(self.worst.where)
         unit = f" {unit}" if unit else ""
         text += f", worst at {self.worst.where}: {self.worst.old}{unit} -> {self.worst.new}{unit}"
         if not math.isnan(self.worst.absolute):
