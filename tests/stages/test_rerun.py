@@ -189,6 +189,18 @@ def test_a_play_whose_name_would_be_a_command_is_refused(tmp_path, bundle, play,
     assert "is no name that a command may hold" in capsys.readouterr().err
 
 
+def test_a_play_whose_tracks_lay_elsewhere_cannot_be_run_again_and_says_which(tmp_path, capsys):
+    results = fabricate(tmp_path)
+    inputs = results / "inputs"
+    write_json(inputs / "inputs.json", {"files": [{"file": "impact_1.csv"}]})
+    artifacts = [Artifact.exact("inputs.json", "x")]
+    write_manifest(inputs, stage="inputs", play="demo", artifacts=artifacts)
+    path = tmp_path / "demo.zip"
+    seal(results, path, source_root=fabricate_source(tmp_path / "s"), play_folder=play_folder(tmp_path))
+    assert main(["rerun", str(path), "--into", str(tmp_path / "again"), "--yes"]) == 1
+    assert "the play names impact_1.csv outside its own folder" in capsys.readouterr().err
+
+
 def test_programs_of_the_source_keep_their_mode_and_gain_no_other(tmp_path, environment, monkeypatch, bundle):
     programs = [member("Snakefile"), member("environment.lock"), member("pyproject.toml")]
     programs += [member(".ci/run", mode=0o755), member("setuid", mode=0o6777)]

@@ -129,6 +129,13 @@ def _plan(run: SealedRun, into: Path, environment: Path | None, cores: int | Non
         what = f"its source lacks {', '.join(missing)}" if missing else "it lacks the play as it was described"
         message = f"{run.path.name}: cannot be run again: {what}"
         raise BundleError(message)
+    if elsewhere := _tracks_elsewhere(run, facts, play):
+        names = ", ".join(map(shown, elsewhere))
+        message = (
+            f"{run.path.name}: cannot be run again: the play names {names} outside its own folder\n"
+            "    mend: ask for a bundle of the play with its tracks beside play.yaml"
+        )
+        raise BundleError(message)
     root = into / "source"
     prepare: tuple[tuple[str, ...], ...] = ()
     if environment is None:
@@ -143,6 +150,14 @@ def _plan(run: SealedRun, into: Path, environment: Path | None, cores: int | Non
     target = f"results/{play}/bundle/{play}.zip"
     command = (str(python), "-m", "snakemake", target, "--cores", str(cores or "all"), "--config", *config)
     return Plan(play, root, python.parents[1], prepare, command, root / target)
+
+
+def _tracks_elsewhere(run: SealedRun, facts: dict[str, Any], play: str) -> list[str]:
+    """Tracks that the play took from outside its folder: the description would not find them again."""
+    described = [*run.files, *(entry["path"] for entry in facts.get("left_out", []))]
+    beside = {name.rpartition("/")[2] for name in described if name.startswith(f"plays/{play}/")}
+    inputs = run.json("results/inputs/inputs.json") or {}
+    return [entry["file"] for entry in inputs.get("files", []) if entry["file"] not in beside]
 
 
 def _installation() -> tuple[tuple[str, ...], ...]:
