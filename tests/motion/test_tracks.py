@@ -3,8 +3,9 @@
 import pytest
 
 from replay.errors import InputError, InputErrors
+from replay.motion.readers import Context, read_tracks
 from replay.motion.settings import load_camera
-from replay.motion.tracks import read_clicks, read_template
+from replay.motion.tracks import read_template
 
 SIZE = (1280.0, 720.0)
 TEMPLATE = "landmark,X,Y,Z\nLM1,0.185,0,-0.045\nLM2,0.135,0.095,-0.05\nLM3,0.135,-0.095,-0.05\nLM4,0.145,0,0.085\n"
@@ -25,7 +26,8 @@ def files(tmp_path):
 
 
 def read(files):
-    return read_clicks(files / "kinovea_clicks.csv", read_template(files / "helmet_landmarks.csv"), SIZE)
+    template = read_template(files / "helmet_landmarks.csv")
+    return read_tracks(files / "kinovea_clicks.csv", template, Context(59.94, SIZE)).tracks
 
 
 def message(files):
