@@ -83,6 +83,21 @@ def _parser() -> argparse.ArgumentParser:
         "--seed", type=int, default=None, help="seed of the click or sensor noise (default: the shipped play's)"
     )
 
+    digitize = commands.add_parser("digitize", help="follow clicked landmarks through a video -> click table")
+    digitize.add_argument("video", type=Path, help="the video")
+    digitize.add_argument(
+        "--seeds", type=Path, required=True, metavar="SEEDS.csv", help="click table with a few clicks"
+    )
+    digitize.add_argument("--out", type=Path, required=True, metavar="CLICKS.csv", help="click table of every frame")
+    digitize.add_argument("--first", type=int, default=None, help="first frame (default: that of the first click)")
+    digitize.add_argument(
+        "--last", type=int, default=None, help="last frame (default: that of the last click, or the video's)"
+    )
+    digitize.add_argument(
+        "--click-sigma", type=_not_negative, default=1.0, metavar="PX", help="noise of your own clicks (default 1)"
+    )
+    digitize.add_argument("--patch", type=_positive, default=21, metavar="PX", help="side of the patch (default 21)")
+
     model = commands.add_parser("model", help="build a head and helmet model by itself")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
     model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse"])
@@ -122,6 +137,14 @@ def _positive(text: str) -> int:
     return number
 
 
+def _not_negative(text: str) -> float:
+    number = float(text)
+    if not 0.0 <= number < float("inf"):
+        message = "must be a number, at least 0"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
 def _run_stage(arguments: argparse.Namespace) -> int:
     import importlib
 
@@ -149,6 +172,14 @@ def _run_tool(arguments: argparse.Namespace) -> int:
         "verify": lambda: tools.verify_bundle(arguments.bundle),
         "compare": lambda: tools.compare_bundles(arguments.old, arguments.new),
         "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
+        "digitize": lambda: tools.digitise_video(
+            arguments.video,
+            arguments.seeds,
+            arguments.out,
+            (arguments.first, arguments.last),
+            arguments.click_sigma,
+            arguments.patch,
+        ),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview
         ),

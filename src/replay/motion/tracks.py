@@ -30,6 +30,16 @@ WEIGHTED_CLICKS = TableFormat(
 )
 """Format of ``kinovea_clicks.csv`` where clicks differ in worth."""
 
+DIGITISED = TableFormat(
+    "digitised clicks",
+    (
+        *WEIGHTED_CLICKS.columns,
+        Column("sigma_px", "standard deviation that following adds to the click, per coordinate [px]"),
+        Column("source", "click, or followed", kind="text"),
+    ),
+)
+"""Format that ``replay digitize`` writes; a click table with two columns more."""
+
 TEMPLATE = TableFormat(
     "landmark template",
     (

@@ -91,7 +91,7 @@ def examine_video(path: Path, window: tuple[int, int] | None = None) -> Video:
             expected="tracks of this video, frames counted from 0",
             mend="check that the tracks belong to this video",
         )
-    _refuse_uneven(path, np.array(times), fps)
+    _refuse_uneven(path, np.sort(times), fps)  # the container hands them over in decoding order
     moving = [ratio for ratio in combs if ratio > 0.0]
     if len(moving) >= 3 and float(np.median(moving)) > COMB_RATIO:
         raise InputError(

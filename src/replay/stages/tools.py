@@ -11,7 +11,9 @@ from replay.errors import InputError
 from replay.files import read_json, write_text
 from replay.gates import Gate, Limits, read_gate
 from replay.motion import synthesise
+from replay.motion.digitise import digitise, digitising_report, write_digitised
 from replay.motion.synthetic import Preset
+from replay.motion.tracking import Following
 from replay.play import load_play, play_schema_text
 from replay.stages.verdict import ALL_GATE_FILES
 
@@ -84,6 +86,18 @@ def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
     write_text(into / "play.yaml", text)
     load_play(into)
     print(f"{into}: a play of kind {kind} with its truth\nrun it: make run PLAY={into.name} PLAYS={into.parent}")
+    return 0
+
+
+def digitise_video(
+    video: Path, seeds: Path, out: Path, frames: tuple[int | None, int | None], click_sigma_px: float, patch_px: int
+) -> int:
+    """Follow clicked landmarks through a video, write the click table, say what was lost and where to click again."""
+    how = Following(patch_px=patch_px | 1)
+    found, facts = digitise(video, seeds, first=frames[0], last=frames[1], how=how)
+    write_digitised(out, found, click_sigma_px)
+    print(digitising_report(found, facts))
+    print(f"{out}: a click table for `source.clicks` of a play")
     return 0
 
 
