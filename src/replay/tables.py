@@ -22,6 +22,7 @@ from replay.files import read_text, write_text
 
 Kind = Literal["float", "int", "text"]
 _MOST_ERRORS = 20
+_LONGEST_LIST = 400
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,9 @@ class TableFormat:
         text = read_text(path)
         lines = text.split("\n")
         self._refuse_foreign_separator(path, lines)
-        rows = [(reader_line, row) for reader_line, row in _rows(text) if any(cell.strip() for cell in row)]
+        rows = [(reader_line, row) for reader_line, row in _rows(path, text) if any(cell.strip() for cell in row)]
+        if not rows:
+            raise InputError(path, "every cell is empty", expected=f"a {self.title}", mend="export the file again")
         header = [cell.strip() for cell in rows[0][1]]
         where = self._find_columns(path, rows[0][0], header)
         errors: list[InputError] = []
@@ -182,7 +185,7 @@ class TableFormat:
         if missing:
             raise InputError(
                 path,
-                f"column {', '.join(missing)} is missing (found: {', '.join(header)})",
+                f"column {', '.join(missing)} is missing (found: {_listed(header)})",
                 line=line,
                 expected=", ".join(self.names),
                 mend="rename the heading or export the column",
@@ -190,13 +193,22 @@ class TableFormat:
         return where
 
 
-def _rows(text: str) -> list[tuple[int, list[str]]]:
+def _rows(path: str | Path, text: str) -> list[tuple[int, list[str]]]:
     reader = csv.reader(io.StringIO(text))
     out, start = [], 1
-    for row in reader:
-        out.append((start, row))
-        start = reader.line_num + 1
+    try:
+        for row in reader:
+            out.append((start, row))
+            start = reader.line_num + 1
+    except csv.Error as error:
+        mend = "close the quotation mark that opens in or before that line"
+        raise InputError(path, f"is no table of cells: {error}", line=start, mend=mend) from None
     return out
+
+
+def _listed(header: list[str]) -> str:
+    text = ", ".join(header)
+    return text if len(text) <= _LONGEST_LIST else text[:_LONGEST_LIST] + " ..."
 
 
 def _ragged(path: str | Path, line: int, row: list[str], header: list[str]) -> InputError:
@@ -204,7 +216,7 @@ def _ragged(path: str | Path, line: int, row: list[str], header: list[str]) -> I
     if len(row) > len(header) and any(cell.strip().lstrip("-").isdigit() for cell in row):
         mend = "if numbers use decimal commas, export with decimal points; otherwise mend the row"
     return InputError(
-        path, f"{len(row)} cells where the heading has {len(header)}", line=line, expected=", ".join(header), mend=mend
+        path, f"{len(row)} cells where the heading has {len(header)}", line=line, expected=_listed(header), mend=mend
     )
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 from replay.errors import InputError
-from replay.files import read_text
+from replay.motion.readers.cells import rows_of
 from replay.motion.readers.observations import Context, Observation, raise_all
 from replay.motion.tracks import CLICKS, WEIGHTED_CLICKS
 
@@ -27,8 +25,7 @@ def read(path: Path, context: Context) -> list[Observation]:
     InputError, InputErrors
         Missing columns or numbers, weights outside (0, 1], frames out of order.
     """
-    header = next(csv.reader(io.StringIO(read_text(path).lstrip("\n"))), [])
-    weighted = "weight" in [cell.strip() for cell in header]
+    weighted = "weight" in rows_of(path)[0][1]
     table = (WEIGHTED_CLICKS if weighted else CLICKS).read(path)
     weights = table["weight"] if weighted else [1.0] * len(table)
     rows = zip(table.attrs["lines"], table["frame"], table["landmark_id"], table["u_px"], table["v_px"], weights)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 from replay.errors import InputError
-from replay.files import read_text
+from replay.motion.readers.cells import rows_of
 from replay.motion.readers.numerals import number_at
 from replay.motion.readers.observations import Context, Observation
 from replay.motion.readers.predictions import choose_individual, weight_of
@@ -30,11 +28,7 @@ def read(path: Path, context: Context) -> list[Observation]:
         Headings that do not match, several individuals and none named, indices that are no frames, likelihoods
         outside [0, 1].
     """
-    reader = csv.reader(io.StringIO(read_text(path)))
-    try:
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except csv.Error as error:
-        raise InputError(path, f"is no table: {error}", line=reader.line_num, mend="export it again") from None
+    rows = rows_of(path)
     depth = next((i for i, (_, row) in enumerate(rows[:5]) if row[0].casefold() == "coords"), None)
     headings = {row[0].casefold(): row for _, row in rows[: (depth or 0) + 1]}
     if depth is None or "bodyparts" not in headings or len({len(row) for row in headings.values()}) > 1:

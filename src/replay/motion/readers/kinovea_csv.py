@@ -6,13 +6,12 @@ empty where a track is not. The kinematics dialogs write CSV too, of filtered va
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from pathlib import Path
 
 from replay.errors import InputError
 from replay.files import read_text
+from replay.motion.readers.cells import rows_of
 from replay.motion.readers.exported import Block, Row, to_pixels
 from replay.motion.readers.numerals import number_at, stamp_at
 from replay.motion.readers.observations import Context, Observation
@@ -38,14 +37,9 @@ def read(path: Path, context: Context) -> list[Observation]:
         An export of filtered kinematics, columns without a partner, rows longer than the heading, and what
         `to_pixels` refuses.
     """
-    text = read_text(path)
-    first = next(line for line in text.split("\n") if line.strip())
+    first = next(line for line in read_text(path).split("\n") if line.strip())
     separator = next((mark for mark in (";", "\t") if mark in first), ",")
-    reader = csv.reader(io.StringIO(text), delimiter=separator)
-    try:
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except csv.Error as error:
-        raise InputError(path, f"is no table: {error}", line=reader.line_num, mend="export the file again") from None
+    rows = rows_of(path, separator)
     heading_line, heading = rows[0]
     tracks = _tracks(path, heading_line, heading)
     for line, row in rows[1:]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 
 from replay.errors import InputError
-from replay.files import read_text
+from replay.motion.readers.cells import rows_of
 from replay.motion.readers.numerals import number_at
 from replay.motion.readers.observations import Context, Observation
 from replay.motion.readers.predictions import choose_individual, weight_of
@@ -29,11 +27,7 @@ def read(path: Path, context: Context) -> list[Observation]:
     InputError
         Nodes without coordinates, several tracks and none named, frames that are no whole numbers.
     """
-    reader = csv.reader(io.StringIO(read_text(path)))
-    try:
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader if any(row)]
-    except csv.Error as error:
-        raise InputError(path, f"is no table: {error}", line=reader.line_num, mend="export it again") from None
+    rows = rows_of(path)
     line, heading = rows[0]
     where = {title: index for index, title in enumerate(heading)}
     nodes = [title[:-2] for title in heading if title.endswith(".x")]
