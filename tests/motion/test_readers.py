@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import types
+
 import numpy as np
 import pytest
 from tests.motion.formats import FIRST, FORMATS, FPS, NAMES, SIZE, deeplabcut, kinovea_csv, kinovea_txt, pixels, sleap
@@ -151,6 +153,21 @@ def test_an_export_at_another_frame_rate_is_refused_rather_than_guessed(tmp_path
 def test_tracks_that_each_start_at_their_own_zero_are_refused(tmp_path):
     text = kinovea_txt(pixels() - pixels()[:1] + np.array([640.0, 360.0]))
     assert "each counts from its own first point" in refused(tmp_path, text)
+
+
+def test_the_reader_that_the_page_shows_reads(tmp_path, repository, monkeypatch):
+    page = (repository / "docs" / "reconstruction.md").read_text()
+    code = page.split("<!-- example of a reader: begin -->")[1].split("```python\n")[1].split("```")[0]
+    example = types.ModuleType("wide")
+    exec(compile(code, "docs/reconstruction.md", "exec"), example.__dict__)
+    monkeypatch.setattr("replay.motion.readers.registry.READERS", {"wide": example, **READERS})
+    heading = ["frame", *(f"{name}_{axis}" for name in NAMES for axis in "xy")]
+    rows = [[str(FIRST + k), *(f"{c:.2f}" for u, v in row for c in (u, SIZE[1] - v))] for k, row in enumerate(pixels())]
+    text = "\n".join(",".join(row) for row in [heading, *rows]) + "\n"
+    reading = read(tmp_path, text)
+    assert reading.format == "wide"
+    assert reading.tracks.pixels == pytest.approx(pixels())
+    assert "tracks.txt:2: LM1_x: 'q' is not a number" in refused(tmp_path, text.replace("600.00", "q", 1))
 
 
 @pytest.mark.shared
