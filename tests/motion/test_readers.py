@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import types
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 from tests.motion.formats import FIRST, FORMATS, FPS, NAMES, SIZE, deeplabcut, kinovea_csv, kinovea_txt, pixels, sleap
 
 from replay.errors import InputError, InputErrors
+from replay.motion import check_tracks
+from replay.motion.clip import load_clip
 from replay.motion.readers import READERS, Context, read_tracks
 from replay.motion.readers.kinovea_xml import blocks
 from replay.motion.tracks import Template
+from replay.play import ClicksSource, load_play
 
 TEMPLATE = Template(NAMES, np.array([[0.18, 0.0, -0.04], [0.13, 0.09, -0.05], [0.13, -0.09, -0.05], [0.14, 0.0, 0.08]]))
 CONTEXT = Context(FPS, SIZE)
@@ -153,6 +157,26 @@ def test_an_export_at_another_frame_rate_is_refused_rather_than_guessed(tmp_path
 def test_tracks_that_each_start_at_their_own_zero_are_refused(tmp_path):
     text = kinovea_txt(pixels() - pixels()[:1] + np.array([640.0, 360.0]))
     assert "each counts from its own first point" in refused(tmp_path, text)
+
+
+def test_a_play_reads_its_kva_as_it_would_read_the_clicks(tmp_path):
+    folder = tmp_path / "play"
+    folder.mkdir()
+    points = [",".join([name, *map(str, xyz)]) for name, xyz in zip(NAMES, TEMPLATE.points_m)]
+    (folder / "helmet_landmarks.csv").write_text("\n".join(["landmark,X,Y,Z", *points]) + "\n")
+    camera = {"fps": FPS, "principal_point": [SIZE[0] / 2, SIZE[1] / 2], "helmet_to_com": [0, 0, 0]}
+    (folder / "Config.json").write_text(json.dumps(camera))
+    for file in ("kva", "clicks"):
+        (folder / f"tracks.{file}").write_text(FORMATS[file](pixels()), encoding="utf-8")
+    clips = []
+    for file in ("kva", "clicks"):
+        (folder / "play.yaml").write_text(f"name: play\nsource:\n  kind: clicks\n  clicks: tracks.{file}\n")
+        play = load_play(folder)
+        assert isinstance(play.source, ClicksSource)
+        clips.append(load_clip(play, play.source))
+        assert check_tracks(play)["format"] == file
+    assert (clips[0].tracks.pixels == clips[1].tracks.pixels).all()
+    assert (clips[0].tracks.frames == clips[1].tracks.frames).all()
 
 
 def test_the_reader_that_the_page_shows_reads(tmp_path, repository, monkeypatch):
