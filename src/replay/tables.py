@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +23,6 @@ from replay.files import read_text, write_text
 
 Kind = Literal["float", "int", "text"]
 _MOST_ERRORS = 20
-_LONGEST_LIST = 400
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ class TableFormat:
             )
 
     def _find_columns(self, path: str | Path, line: int, header: list[str]) -> dict[str, str]:
-        twice = sorted({h for h in header if h and header.count(h) > 1})
+        twice = sorted(h for h, count in Counter(header).items() if h and count > 1)
         if twice:
             raise InputError(path, f"the heading {twice[0]!r} occurs twice", line=line, mend="rename or remove one")
         where, missing = {}, []
@@ -185,7 +185,7 @@ class TableFormat:
         if missing:
             raise InputError(
                 path,
-                f"column {', '.join(missing)} is missing (found: {_listed(header)})",
+                f"column {', '.join(missing)} is missing (found: {', '.join(header)})",
                 line=line,
                 expected=", ".join(self.names),
                 mend="rename the heading or export the column",
@@ -206,17 +206,12 @@ def _rows(path: str | Path, text: str) -> list[tuple[int, list[str]]]:
     return out
 
 
-def _listed(header: list[str]) -> str:
-    text = ", ".join(header)
-    return text if len(text) <= _LONGEST_LIST else text[:_LONGEST_LIST] + " ..."
-
-
 def _ragged(path: str | Path, line: int, row: list[str], header: list[str]) -> InputError:
     mend = "complete the row or remove it"
     if len(row) > len(header) and any(cell.strip().lstrip("-").isdigit() for cell in row):
         mend = "if numbers use decimal commas, export with decimal points; otherwise mend the row"
     return InputError(
-        path, f"{len(row)} cells where the heading has {len(header)}", line=line, expected=_listed(header), mend=mend
+        path, f"{len(row)} cells where the heading has {len(header)}", line=line, expected=", ".join(header), mend=mend
     )
 
 
