@@ -154,6 +154,24 @@ def test_an_export_at_another_frame_rate_is_refused_rather_than_guessed(tmp_path
     assert "no frame at 59.94 frames per second in s, ms, us or frames" in said
 
 
+def test_time_codes_are_read_where_a_hundredth_tells_frames_apart(tmp_path):
+    def coded(fps):
+        rows = []
+        for row in kinovea_txt(pixels()).split("\n"):
+            time, _, rest = row.partition(" ")
+            if time[:1].isdigit():
+                # cut off, not rounded, as 0.8 did
+                hundredths = int(round(float(time) * FPS) / fps * 100.0 + 1e-6)
+                row = f"0:00:{hundredths // 100:02d}:{hundredths % 100:02d} {rest}"
+            rows.append(row)
+        return "\n".join(rows)
+
+    for fps in (24.0, 25.0, 29.97, 50.0):
+        reading = read(tmp_path, coded(fps), Context(fps, SIZE))
+        assert reading.tracks.frames.tolist() == list(range(FIRST, FIRST + 7)), fps
+    assert "times are given to 0.01, frames are 0.0167 apart" in refused(tmp_path, coded(59.94), Context(59.94, SIZE))
+
+
 def test_tracks_that_each_start_at_their_own_zero_are_refused(tmp_path):
     text = kinovea_txt(pixels() - pixels()[:1] + np.array([640.0, 360.0]))
     assert "each counts from its own first point" in refused(tmp_path, text)

@@ -54,10 +54,11 @@ def _shown(text: str) -> str:
 
 @dataclass(frozen=True)
 class Stamp:
-    """A time as the file has it: a number, or seconds of a time code; its text and line for messages."""
+    """A time as the file has it: a number, or seconds of a time code; its decimals, its text and line for messages."""
 
     value: float
     is_code: bool
+    decimals: int
     text: str
     line: int | None
 
@@ -77,7 +78,7 @@ def stamp_at(path: Path, text: str, line: int | None) -> Stamp:
         value = 3600.0 * int(hours) + 60.0 * int(minutes) + int(seconds)
         if fraction:
             value += int(fraction) / 10.0 ** len(fraction)
-        return Stamp(-value if sign else value, True, text, line)
+        return Stamp(-value if sign else value, True, len(fraction or ""), text, line)
     value = number(text)
     if not math.isfinite(value):
         raise InputError(
@@ -88,14 +89,15 @@ def stamp_at(path: Path, text: str, line: int | None) -> Stamp:
             expected="a number, or hours:minutes:seconds:hundredths",
             mend="export the file again",
         )
-    return Stamp(value, False, text, line)
+    return Stamp(value, False, len(re.split("[.,]", text)[1]) if re.search("[.,]", text) else 0, text, line)
 
 
 def frames_of(path: Path, stamps: Sequence[Stamp], fps: float) -> list[int]:
     """Frame numbers of times whose unit the file does not state.
 
     The unit is the one of seconds, milliseconds, microseconds and frames in which the commonest step is a whole
-    number of frames; where none is, or a time falls between two frames, the file is refused rather than guessed.
+    number of frames; where none is, where a time falls between two frames, or where the last decimal is coarser than
+    half a frame (programs cut decimals off as often as they round), the file is refused rather than guessed.
 
     Raises
     ------
@@ -108,6 +110,16 @@ def frames_of(path: Path, stamps: Sequence[Stamp], fps: float) -> list[int]:
     else:
         steps = np.diff(np.unique(values))
         scale = _scale(path, float(np.median(steps)) if len(steps) else 0.0, fps, stamps[0].line)
+    coarseness = 10.0 ** -max(stamp.decimals for stamp in stamps)
+    if coarseness * scale > 0.5 and scale != 1.0:
+        raise InputError(
+            path,
+            f"times are given to {coarseness:g}, frames are {1.0 / scale:.3g} apart",
+            line=stamps[0].line,
+            column="time",
+            expected="times that tell one frame from the next",
+            mend="choose milliseconds or frames as Kinovea's time format, or give the .kva, which keeps the frames",
+        )
     out = []
     for stamp in stamps:
         at = stamp.value * scale
