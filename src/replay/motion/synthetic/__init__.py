@@ -18,6 +18,7 @@ The motions of `Impact` are in closed form, so that position, velocity and accel
 those of `RecordedMotion` are the exact integrals of splines through a record.
 """
 
+from replay.motion.settings import LEVEL_CAMERA
 from replay.motion.synthetic.footage import (
     ARTICLE_OFFSET_M,
     HEAD_SIZED_OFFSET_M,
@@ -36,6 +37,7 @@ __all__ = [
     "ARTICLE_OFFSET_M",
     "HEAD_SIZED_OFFSET_M",
     "LANDMARKS",
+    "LEVEL_CAMERA",
     "PULSES",
     "SEEDS",
     "TEN",
