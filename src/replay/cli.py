@@ -33,6 +33,7 @@ _STAGES: dict[str, tuple[str, str]] = {
     "seal": ("seal", "the sealed bundle"),
 }
 _ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
+_PULSES = ("sine_squared", "half_sine", "triangle", "skewed", "double")
 _SOLVING = ("shake", "impact", "sensitivity")
 
 
@@ -79,11 +80,46 @@ def _parser() -> argparse.ArgumentParser:
     _add_bundle_tools(commands)
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
-    synth.add_argument("kind", choices=["demo", "broadcast", "wearable"], help="which camera or sensor sees the impact")
+    synth.add_argument(
+        "kind", choices=["demo", "broadcast", "wearable", "footage"], help="a shipped play, or any footage"
+    )
     synth.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for the play")
     synth.add_argument(
         "--seed", type=int, default=None, help="seed of the click or sensor noise (default: the shipped play's)"
     )
+
+    footage = synth.add_argument_group("footage", "what the camera sees and what spoils the clicks (kind footage only)")
+    footage.add_argument("--family", default="sine_squared", choices=_PULSES, help="shape of the impact's pulses")
+    footage.add_argument(
+        "--draw", action="store_true", help="draw the impact from the seed instead of the standard one"
+    )
+    footage.add_argument("--motion", type=Path, metavar="KINEMATICS.csv", help="film this record instead of an impact")
+    footage.add_argument("--fps", type=_above_0, default=59.94, help="frame rate [Hz] (default 59.94)")
+    footage.add_argument("--distance", type=_above_0, default=20.0, metavar="M", help="camera to head (default 20)")
+    footage.add_argument("--focal", type=_above_0, default=6000.0, metavar="PX", help="focal length (default 6000)")
+    footage.add_argument("--landmarks", type=int, default=8, choices=range(3, 11), help="how many (default 8)")
+    footage.add_argument("--click-sigma", type=_not_negative, default=1.0, metavar="PX", help="noise (default 1)")
+    footage.add_argument("--blur", type=_not_negative, default=0.0, metavar="SHARE", help="of the streak, added to it")
+    footage.add_argument("--occlusion", type=_not_negative, default=0.0, metavar="SHARE", help="of the clicks hidden")
+    footage.add_argument("--outliers", type=_not_negative, default=0.0, metavar="SHARE", help="of the clicks wild")
+    footage.add_argument("--zoom", type=float, default=0.0, metavar="PER_S", help="rate of log focal length")
+    footage.add_argument("--pan", type=float, default=0.0, metavar="RAD_PER_S", help="with three static points")
+    footage.add_argument("--row-time", type=_not_negative, default=0.0, metavar="S", help="rolling shutter")
+
+    digitize = commands.add_parser("digitize", help="follow clicked landmarks through a video -> click table")
+    digitize.add_argument("video", type=Path, help="the video")
+    digitize.add_argument(
+        "--seeds", type=Path, required=True, metavar="SEEDS.csv", help="click table with a few clicks"
+    )
+    digitize.add_argument("--out", type=Path, required=True, metavar="CLICKS.csv", help="click table of every frame")
+    digitize.add_argument("--first", type=int, default=None, help="first frame (default: that of the first click)")
+    digitize.add_argument(
+        "--last", type=int, default=None, help="last frame (default: that of the last click, or the video's)"
+    )
+    digitize.add_argument(
+        "--click-sigma", type=_not_negative, default=1.0, metavar="PX", help="noise of your own clicks (default 1)"
+    )
+    digitize.add_argument("--patch", type=_positive, default=21, metavar="PX", help="side of the patch (default 21)")
 
     model = commands.add_parser("model", help="build a head and helmet model by itself")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
@@ -168,6 +204,22 @@ def _positive(text: str) -> int:
     return number
 
 
+def _above_0(text: str) -> float:
+    number = _not_negative(text)
+    if number == 0.0:
+        message = "must be above 0"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
+def _not_negative(text: str) -> float:
+    number = float(text)
+    if not 0.0 <= number < float("inf"):
+        message = "must be a number, at least 0"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
 def _run_stage(arguments: argparse.Namespace) -> int:
     import importlib
 
@@ -194,7 +246,19 @@ def _run_tool(arguments: argparse.Namespace) -> int:
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
-        "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
+        "synth": lambda: (
+            tools.write_synthetic_footage(vars(arguments))
+            if arguments.kind == "footage"
+            else tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed)
+        ),
+        "digitize": lambda: tools.digitise_video(
+            arguments.video,
+            arguments.seeds,
+            arguments.out,
+            (arguments.first, arguments.last),
+            arguments.click_sigma,
+            arguments.patch,
+        ),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview
         ),

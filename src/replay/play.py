@@ -59,8 +59,36 @@ class ClicksSource(Setting):
     )
     clicks: InputFile = Field(
         default="kinovea_clicks.csv",
-        description="Clicks: frame, landmark_id, u_px, v_px (protocol 2.2).",
+        description="Tracks of the landmarks: the article's table (frame, landmark_id, u_px, v_px; protocol 2.2), or a "
+        "file of Kinovea, DeepLabCut or SLEAP.",
         validate_default=True,
+    )
+    format: Literal["auto", "clicks", "kva", "kinovea_xml", "kinovea_txt", "kinovea_csv", "deeplabcut", "sleap"] = (
+        Field(default="auto", description="Format of the tracks; `auto` tells it by the file's first lines.")
+    )
+    names: dict[str, str] = Field(
+        default_factory=dict,
+        description="Landmark of each track whose name in the file is another, `name in the file: landmark`.",
+        examples=[{"mask centre": "LM1"}],
+    )
+    ignore: tuple[str, ...] = Field(default=(), description="Tracks of the file that are no landmarks of this head.")
+    individual: str | None = Field(
+        default=None, description="Which individual (DeepLabCut) or track (SLEAP), where the file has several."
+    )
+    least_likelihood: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0.6, description="Predictions of DeepLabCut and SLEAP below this likelihood are left out."
+    )
+    origin_px: tuple[Number, Number] | None = Field(
+        default=None,
+        description="Where a Kinovea export (not a .kva) has its origin in the image [px]; default the image's centre.",
+    )
+    static_points: tuple[str, ...] = Field(
+        default=(),
+        description="Tracks of points that stand still in the scene: the camera's pan, tilt, roll and zoom are "
+        "estimated from them and removed.",
+    )
+    row_time_s: Annotated[Number, Field(ge=0, le=1e-4)] = Field(
+        default=0.0, description="Rolling shutter: time between the exposures of two image rows [s]; 0 is none."
     )
     landmarks: InputFile = Field(
         default="helmet_landmarks.csv",
