@@ -8,6 +8,7 @@ import io
 import json
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +23,7 @@ import pytest
 from linked import everything
 from scipy.spatial.transform import Rotation
 
+import replay.solver.progress as progress_module
 import replay.solver.run as run_module
 from replay.errors import ReplayError, ResumeError
 from replay.solver import (
@@ -355,6 +357,31 @@ def test_progress_speaks_before_the_start_and_then_rarely(layered: Layered, tmp_
     assert "elements that deform" in lines[0]
     assert "MiB" in lines[0]
     assert "steps of" in lines[0]
+
+
+def test_a_progress_line_says_where_the_run_is_and_comes_every_five_seconds_at_most(
+    layered: Layered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(np.arange(0.0, 1e4, 0.5))
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: float(next(clock)))
+    note = io.StringIO()
+    run = Integrator(layered(end=2e-3), 1e9)
+    progress = progress_module.Progress(note, 2e-3)
+    bound = run.forces()
+    progress.estimate(run, bound)
+    for _ in range(16 * 25):
+        dt = 0.4 * run.forces().step_s
+        run.kick(dt, drift=True)
+        run.drift(dt, run.time_s + dt)
+        progress.step(run, bound)
+    lines = note.getvalue().splitlines()[1:]
+    # 25 looks at the clock, half a second apart
+    assert len(lines) == 2
+    holder = f"by element {bound.element + 1} ({run.problem.part_of(bound.element).name})"
+    for line in lines:
+        assert re.search(r"\d+\.\d %  t \d\.\d+ ms  dt \S+ s", line), line
+        assert holder in line
+        assert re.search(r"energy ratio [01]\.\d+  \d+ (s|min) left", line), line
 
 
 def test_outputs_fall_on_their_times_to_the_last_bit(layered: Layered, tmp_path: Path) -> None:

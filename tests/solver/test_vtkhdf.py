@@ -234,3 +234,28 @@ def test_vtk_opens_the_states_with_times_and_values(tmp_path):
         np.testing.assert_array_equal(displacement, expected["displacement_m"].astype("f4"))
         np.testing.assert_array_equal(vtk_to_numpy(grid.GetCellData().GetArray("element_pid")), [1, 4])
         np.testing.assert_array_equal(vtk_to_numpy(grid.GetPointData().GetArray("node_ids")), np.arange(12) + 101)
+
+
+def test_vtk_opens_the_xdmf_twin_with_the_same_values(tmp_path):
+    pytest.importorskip("vtk", reason="VTK is an extra (pip install 'replay-impact[vtk]'): its reader is not here")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    reader = vtkXdmfReader()
+    reader.SetFileName(str(complete(tmp_path).with_suffix(".xdmf")))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(reader.GetExecutive().TIME_STEPS())
+    assert np.allclose(times, np.arange(5) * 1e-3)
+    for index in (0, 4):
+        reader.UpdateTimeStep(times[index])
+        grid = reader.GetOutputDataObject(0)
+        if grid.IsA("vtkMultiBlockDataSet"):
+            grid = grid.GetBlock(0)
+        np.testing.assert_array_equal(vtk_to_numpy(grid.GetPoints().GetData()).astype(float), NODES)
+        expected = state(index)[1]
+        np.testing.assert_array_equal(
+            vtk_to_numpy(grid.GetCellData().GetArray("von_mises_Pa")), expected["von_mises_Pa"].astype("f4")
+        )
+        np.testing.assert_array_equal(
+            vtk_to_numpy(grid.GetPointData().GetArray("displacement_m")), expected["displacement_m"].astype("f4")
+        )

@@ -45,7 +45,7 @@ class TiedSurfaces:
     moved_m
         Greatest distance that a node was moved [m].
     loose : (k,) int
-        Rows of nodes that were too far from any master and are not tied.
+        Rows of nodes on faces that look at a master nearby, yet too far from it to be tied.
     """
 
     tie: Tie
@@ -113,7 +113,8 @@ def tie_surfaces(
     place = np.einsum("kw,kwi->ki", shares, nodes[masters])
     moved = float(np.linalg.norm(place - nodes[tied], axis=1).max())
     nodes[tied] = place
-    loose = np.array([row for row in rows if row not in weights], np.int64)
+    facing = set(tied_faces[[bool(n) for n in near]].ravel().tolist())
+    loose = np.array([row for row in rows if row in facing and row not in weights], np.int64)
     return TiedSurfaces(Tie(name, tied, masters, shares), nodes, moved, loose)
 
 

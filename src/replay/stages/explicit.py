@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from replay.controls import load_controls
-from replay.files import write_json
+from replay.files import hold_folder, write_json
 from replay.solver import solve
 from replay.stages.controlled import build_task
 from replay.stages.solver_model import open_model
@@ -43,9 +43,9 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
     task = build_task(open_model(model), settings, controls)
     for note in task.notes:
         print(note)
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "controls.json", settings.model_dump(mode="json"))
-    summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
+    with hold_folder(out, "this run"):
+        write_json(out / "controls.json", settings.model_dump(mode="json"))
+        summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
     low, high = summary.energy_ratio_range
     energies = summary.energies
     print(
