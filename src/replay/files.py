@@ -26,8 +26,15 @@ LOCK = ".lock"
 
 
 @contextlib.contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path, *, reserve_bytes: int = 0) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on a clean exit it becomes `path`, else it is removed.
+
+    Parameters
+    ----------
+    path
+        The file to write.
+    reserve_bytes
+        Room that the disk must have before anything is written: for libraries that do not survive a full one (HDF5).
 
     Raises
     ------
@@ -39,8 +46,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-        os.close(handle)
         temporary = Path(name)
+        try:
+            if reserve_bytes:
+                os.posix_fallocate(handle, 0, reserve_bytes)
+                os.ftruncate(handle, 0)
+        finally:
+            os.close(handle)
         yield temporary
         temporary.chmod(0o644)
         with temporary.open("rb+") as stream:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from replay.errors import InputError, ResumeError
+from replay.errors import InputError, ReplayError, ResumeError
 from replay.solver.vtkhdf import StatesWriter, read_states
 
 NODES = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1, 2)], float) * 0.01
@@ -210,6 +211,23 @@ def test_xdmf_twin_refers_to_the_same_numbers(tmp_path):
                 assert (stride == 1).all()
                 window = tuple(slice(a, a + c) for a, c in zip(start, count))
                 np.testing.assert_array_equal(resolve(source)[window], states.field(name, index))
+
+
+def test_a_disk_too_full_for_the_file_is_told_before_hdf5_meets_it(tmp_path, monkeypatch):
+    # HDF5 crashes the process on a full disk
+    def full(handle: int, start: int, size: int) -> None:
+        assert size > states.partial_path.stat().st_size
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    states = writer(tmp_path)
+    states.append(*state(0))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "posix_fallocate", full)
+        with pytest.raises(ReplayError, match=r"states.vtkhdf: cannot be written \(No space left on device\)"):
+            states.close()
+    assert [p.name for p in tmp_path.iterdir()] == ["states.partial"]
+    states.close()
+    assert complete(tmp_path / "whole", 1).read_bytes() == (tmp_path / "states.vtkhdf").read_bytes()
 
 
 def test_vtk_opens_the_states_with_times_and_values(tmp_path):
