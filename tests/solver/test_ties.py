@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
-from linked import BONE, RUBBER, STILL, momenta, stacked
+from linked import BONE, MODULUS, RUBBER, STILL, momenta, stacked
 
 from replay.errors import InputError
-from replay.solver import Problem, SolverPart, Tie
+from replay.solver import Material, Problem, SolverPart, Tie
 from replay.solver.blocks import structured_block
 from replay.solver.integrator import Integrator
 from replay.solver.mortar import outer_faces, tie_surfaces
@@ -116,6 +117,32 @@ def test_a_matching_tie_is_a_shared_node() -> None:
     match = [there[tuple(np.round(x, 9))] for x in plain.nodes]
     difference = halves.user_order(halves.nodal)[:, :3] - whole.user_order(whole.nodal)[match, :3]
     assert np.abs(difference).max() < 1e-9 * 0.02
+
+
+def test_a_plane_wave_crosses_the_seam_as_if_there_were_none() -> None:
+    # without lateral contraction a bar moves in planes: other meshes across the seam change nothing
+    bar = Material("bar", "elastic", 1000.0, {"youngs_modulus_pa": MODULUS, "poisson_ratio": 0.0})
+
+    def pulse(nodes: np.ndarray) -> np.ndarray:
+        return np.exp(-(((nodes[:, 2:] - 0.004) / 2e-3) ** 2)) * [0.0, 0.0, 0.1]
+
+    plain = stacked(layers=10)
+    parts = (SolverPart(1, "below", bar), SolverPart(2, "above", bar))
+    tied = Integrator(dataclasses.replace(plain, parts=parts, initial_velocity=pulse(plain.nodes)), 1e9)
+    nodes, hexes = structured_block((1, 1, 20), (0.02, 0.02, 0.02))
+    whole = Integrator(
+        Problem(nodes, hexes, np.zeros(20, int), (SolverPart(1, "bar", bar),), STILL, initial_velocity=pulse(nodes)),
+        1e9,
+    )  # fmt: skip
+    for run in (tied, whole):
+        while run.time_s < 5e-4:
+            run.forces()
+            run.kick(1e-5, drift=False)
+            run.drift(1e-5, run.time_s + 1e-5)
+    layer = np.round(plain.nodes[:, 2] / 1e-3).astype(int)
+    exact = whole.user_order(whole.nodal)[::, 6].reshape(4, 21)[0]
+    assert np.abs(exact[:8]).max() < 0.3 * np.abs(exact[11:]).max()
+    assert np.abs(tied.user_order(tied.nodal)[:, 6] - exact[layer]).max() < 1e-12
 
 
 def test_a_force_crosses_the_seam_whole() -> None:
