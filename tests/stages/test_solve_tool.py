@@ -168,7 +168,10 @@ def test_every_name_that_is_not_there_is_told_at_once(
         ({"joints": [{"name": "j", "second": 20}]}, "is missing"),
         ({"supports": [{"axes": ["x"]}]}, "names its nodes in no way"),
         ({"prescribed_motions": [{"parts": [10], "file": "m.csv"}]}, "the file does not exist"),
-        ({"joints": [{**BLOCKS["joints"][0], "second": 20}]}, "20 is no rigid part and no rigid set"),
+        (
+            {"joints": [{**BLOCKS["joints"][0], "second": 20}]},
+            "controls.yaml: joints.hinge.second: 20 is no rigid part and no rigid set",
+        ),
         (
             {"materials": [{"parts": [20], "law": "elastik", "density_kg_per_m3": 1e3}]},
             "did you mean 'elastic'",
