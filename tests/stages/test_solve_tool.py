@@ -166,6 +166,7 @@ def test_every_name_that_is_not_there_is_told_at_once(
             "two points that span the axis",
         ),
         ({"joints": [{"name": "j", "second": 20}]}, "is missing"),
+        ({"joints": [{**BLOCKS["joints"][0], "x_axis": [0, 0, 2]}]}, "x_axis and z_axis are parallel"),
         ({"supports": [{"axes": ["x"]}]}, "names its nodes in no way"),
         ({"prescribed_motions": [{"parts": [10], "file": "m.csv"}]}, "the file does not exist"),
         (
