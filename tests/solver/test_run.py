@@ -330,6 +330,19 @@ def test_anything_that_changes_the_result_changes_the_models_hash(layered: Layer
     assert layered().digest() == plain.digest()
 
 
+def test_what_a_killed_writer_left_is_cleared_away(layered: Layered, tmp_path: Path) -> None:
+    store = Checkpoints(tmp_path / "checkpoint", identity(layered(end=1e-3)))
+    for end in ("write", "clear"):
+        store.write(1, {"a": np.ones(5)})
+        (tmp_path / "checkpoint" / ".step-000000000002.checkpoint.x1y2.checkpoint").write_bytes(b"half a fi")
+        if end == "write":
+            store.write(3, {"a": np.ones(5)})
+            assert len(list((tmp_path / "checkpoint").iterdir())) == 2
+        else:
+            store.clear()
+            assert not (tmp_path / "checkpoint").exists()
+
+
 def test_a_damaged_checkpoint_falls_back_to_the_one_before(layered: Layered, tmp_path: Path) -> None:
     problem = layered(end=1e-3)
     store = Checkpoints(tmp_path, identity(problem))
