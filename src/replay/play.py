@@ -33,7 +33,7 @@ def _existing(name: str, info: ValidationInfo) -> str:
     refuse(
         "the file does not exist",
         f"a file in {Path(folder).resolve().name}/",
-        "correct the name, or put it beside play.yaml",
+        "correct the name, or put the file there",
     )
 
 
