@@ -5,6 +5,8 @@ The solver takes arrays and returns arrays: a `Problem` of nodes, hexahedra, par
 of plays, heads or helmets. The physics is in `kernels`; docs/physics.md gives the equations.
 """
 
+from replay.solver.contact import ContactControls, ContactPair
+from replay.solver.contact.recorder import CONTACT_TABLE
 from replay.solver.joints import Joint
 from replay.solver.kernels import source_hash
 from replay.solver.ledger import Energies
@@ -21,11 +23,14 @@ from replay.solver.ties import Tie
 from replay.solver.view import Recorder, StateView
 
 __all__ = [
+    "CONTACT_TABLE",
     "ENERGY_TABLE",
     "HISTORY_TABLE",
     "LAWS",
     "PART_ENERGY_TABLE",
     "TIME_STEP_TABLE",
+    "ContactControls",
+    "ContactPair",
     "Controls",
     "Energies",
     "Joint",

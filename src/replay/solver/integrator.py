@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.solver.contact.contact import Contact, Forces
 from replay.solver.elements import ElementGroup
 from replay.solver.kernels.assembly import CHUNK, RUNAWAYS, advance_nodes, drift_nodes, gather_forces
 from replay.solver.kernels.lanes import NODE_COLUMNS, POSITION, VELOCITY
@@ -66,6 +67,16 @@ class Integrator:
         self._sums = np.zeros(((self.layout.n_free + CHUNK - 1) // CHUNK, 4))
         free = self.nodal[: self.layout.n_free, VELOCITY : VELOCITY + 3]
         moving = 0.5 * float((self.mass[: self.layout.n_free] * (free**2).sum(axis=1)).sum())
+        self.contact: Contact | None = None
+        if problem.contact is not None:
+            self.contact = Contact(
+                problem.contact, self.layout.node_row[problem.hexes], problem.element_part,
+                tuple(part.pid for part in problem.parts), self.nodal, self.layout.carrier, self.bodies,
+                self.tied.nodes,
+            )  # fmt: skip
+        self._forces = Forces(
+            self._force, self.layout.first_slot, self.layout.slot, self.mass, self._inverse_mass, self._external
+        )
         self.ledger = Ledger(len(problem.parts), moving + self.bodies.kinetic(self.nodal))
         self.time_s, self.step, self.dt_s = 0.0, 0, 0.0
         self.runaways = 0
@@ -109,6 +120,8 @@ class Integrator:
             self._external[self.links.touched] = self._steady[self.links.touched]
             self.links.forces(self.nodal, self._external, self.time_s)
             step = self.links.limited(step)
+        if self.contact is not None:
+            self.contact.settle(self.nodal, self._forces, self.dt_s)
         return StepBound(step, bound.element)
 
     def inner_forces(self) -> NDArray[np.float64]:
@@ -129,22 +142,28 @@ class Integrator:
         """
         layout = self.layout
         dt_kick = 0.5 * (self.dt_s + dt_next)
-        self._drifted = drift
+        contact, first, limit = self.contact, layout.n_free, self.speed_limit
+        self._drifted = drift and contact is None
+        before = self.nodal[first:, VELOCITY : VELOCITY + 3].copy() if contact is not None else None
         if self.links.active:
             self.links.before_kick(self.nodal)
         advance_nodes(
-            self.nodal, layout.n_free, self._force, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
-            self._external, dt_kick, dt_next if drift else 0.0, self.speed_limit, self._sums,
+            self.nodal, first, self._force, layout.first_slot, layout.slot, self.mass, self._inverse_mass,
+            self._external, dt_kick, dt_next if self._drifted else 0.0, limit, self._sums,
         )  # fmt: skip
         if self.bodies.count:
             self._body_velocity_before = self.bodies.velocity.copy()
-            first, last = layout.n_free, len(self.nodal)
-            gather_forces(self._force, layout.first_slot, layout.slot, first, last, self.bodies.inner)
-            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next, self.speed_limit)
-        self.runaways = int(self._sums[:, RUNAWAYS].sum() + self.bodies.sums[:, 4].sum())
+            gather_forces(self._force, layout.first_slot, layout.slot, first, len(self.nodal), self.bodies.inner)
+            self.bodies.kick(self.nodal, self.time_s, dt_kick, dt_next, limit)
         self.tied.move(self.nodal)
+        if contact is not None and before is not None:
+            if contact.apply(self.nodal, self._forces, dt_kick, dt_next, before):
+                self.bodies.kick_again(self.nodal, before, self.time_s, dt_kick, dt_next, limit)
+            contact.finish(self.nodal, self._forces, dt_next)
+            self.tied.move(self.nodal)
+        self.runaways = int(self._sums[:, RUNAWAYS].sum() + self.bodies.sums[:, 4].sum())
         linked = self.links.work(self.nodal, dt_kick) if self.links.active else None
-        self.ledger.advance(self._sums, self.bodies.sums, linked)
+        self.ledger.advance(self._sums, self.bodies.sums, linked, None if contact is None else contact.sums)
 
     def drift(self, dt_next: float, time_next: float) -> None:
         """Move everything to the end of the step."""
@@ -202,6 +221,8 @@ class Integrator:
             result |= {f"{group.group.law}.{name}": array for name, array in group.arrays().items()}
         result |= {f"bodies.{name}": array for name, array in self.bodies.arrays().items()}
         result |= {f"ledger.{name}": array for name, array in self.ledger.arrays().items()}
+        if self.contact is not None:
+            result |= {f"contact.{name}": array for name, array in self.contact.arrays().items()}
         return result
 
     def variable(self, name: str) -> NDArray[np.float64]:
@@ -222,9 +243,11 @@ class Integrator:
     def restore(self, arrays: dict[str, NDArray[np.float64]]) -> None:
         """Go back to what `arrays` returned; the next call must be `forces`."""
         for name, array in self.arrays().items():
-            if name not in ("clock",) and not name.startswith("ledger."):
+            if name not in ("clock",) and not name.startswith(("ledger.", "contact.")):
                 array[...] = arrays[name]
         self.ledger.restore({name[7:]: value for name, value in arrays.items() if name.startswith("ledger.")})
+        if self.contact is not None:
+            self.contact.restore({name[8:]: value for name, value in arrays.items() if name.startswith("contact.")})
         time, dt, step = arrays["clock"].tolist()
         self.time_s, self.dt_s, self.step = time, dt, int(step)
 

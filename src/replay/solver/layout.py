@@ -86,6 +86,8 @@ class Layout:
         their motions.
     body_begin, body_end : (n_bodies,) int64
         Tied nodes of each body, counted from `n_free`.
+    carrier : (n,) int64
+        Body of each solver node, -1 for none.
     batches
         Rows of the force array by group.
     n_rows : int
@@ -102,6 +104,7 @@ class Layout:
     body_sets: tuple[tuple[int, ...], ...]
     body_begin: NDArray[np.int64]
     body_end: NDArray[np.int64]
+    carrier: NDArray[np.int64]
     batches: tuple[BatchRows, ...]
     n_rows: int
     first_slot: NDArray[np.uint32]
@@ -166,7 +169,7 @@ def arrange(problem: Problem) -> Layout:
     parts = tuple(tuple(k for k in keys if k < n_parts) for keys in members)
     sets = tuple(tuple(k - n_parts for k in keys if k >= n_parts) for keys in members)
     return Layout(
-        node_order, node_row, n_free, groups, parts, sets, begin, end, batches, len(row_node),
+        node_order, node_row, n_free, groups, parts, sets, begin, end, body_of_node[node_order], batches, len(row_node),
         first_slot.astype(np.uint32), slot.astype(np.uint32),
     )  # fmt: skip
 

@@ -105,8 +105,8 @@ class Ledger:
     def __init__(self, n_parts: int, kinetic: float) -> None:
         self.initial = kinetic
         self.part_work = np.zeros((n_parts, 3))
-        # half steps before and after the present time: kinetic, absorbed, outside, tie, links
-        self._before = np.array([kinetic, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+        # half steps before and after the present time: kinetic, absorbed, outside, tie, links (3), contact (2)
+        self._before = np.array([kinetic, *[0.0] * 8])
         self._after = self._before.copy()
 
     def advance(
@@ -114,6 +114,7 @@ class Ledger:
         chunks: NDArray[np.float64],
         bodies: NDArray[np.float64],
         linked: tuple[NDArray[np.float64], float] | None = None,
+        contact: NDArray[np.float64] | None = None,
     ) -> None:
         """Enter the kick at the present time.
 
@@ -126,6 +127,8 @@ class Ledger:
         linked
             Work taken by joint springs, joint dampers and straps (3,), and what of it was done on free nodes, where
             `chunks` has entered it as work from outside.
+        contact : (SUMS,) float64, optional
+            Sums of `kernels.contact_work`: changes of kinetic, absorbed, outside; lost in normal contact, in friction.
         """
         self._before, after = self._after, self._after.copy()
         nodes, carried = chunks.sum(axis=0), bodies.sum(axis=0)
@@ -136,20 +139,24 @@ class Ledger:
         if linked is not None:
             taken, on_nodes = linked
             after[2] -= on_nodes
-            after[4:] += taken
+            after[4:7] += taken
+        if contact is not None:
+            after[:3] += contact[:3]
+            after[7:] += contact[3:]
         self._after = after
 
     def energies(self, added_mass_kinetic: float = 0.0, plastic: float = 0.0) -> Energies:
         """Ledger at the present time: the mean of the half steps around it, and the two shares that others know."""
-        kinetic, absorbed, outside, tie, spring, damper, strap = (0.5 * (self._before + self._after)).tolist()
+        mean = (0.5 * (self._before + self._after)).tolist()
+        kinetic, absorbed, outside, tie, spring, damper, strap, normal, friction = mean
         stress, hourglass, viscosity = self.part_work.sum(axis=0).tolist()
         return Energies(
             kinetic=kinetic,
             internal=stress,
             hourglass=hourglass,
             bulk_viscosity=viscosity,
-            contact_normal=0.0,
-            friction=0.0,
+            contact_normal=normal,
+            friction=friction,
             joint_spring=spring,
             joint_damper=damper,
             strap=strap,

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from replay.errors import InputError
 from replay.solver.arrays import WHERE, checked_array, checked_integers, checked_rows
+from replay.solver.contact.settings import ContactControls
 from replay.solver.joints import Joint
 from replay.solver.kernels.geometry import element_gradients
 from replay.solver.materials import LAWS, Material, law_parameters
@@ -164,6 +165,8 @@ class Problem:
         Nodes that move as bodies.
     joints, straps, ties
         Force elements between bodies, cables through nodes, tied interfaces.
+    contact
+        Contact of all parts; None lets them pass through each other.
 
     Raises
     ------
@@ -187,6 +190,7 @@ class Problem:
     joints: tuple[Joint, ...] = ()
     straps: tuple[Strap, ...] = ()
     ties: tuple[Tie, ...] = ()
+    contact: ContactControls | None = None
 
     def __post_init__(self) -> None:
         put = object.__setattr__
@@ -262,6 +266,8 @@ class Problem:
             )
         for part in self.parts:
             law_parameters(part.material)
+        if self.contact is not None:
+            self.contact.check(pids, [part.pid for part in self.parts if part.material.is_rigid])
         self._check_motion()
 
     def _check_motion(self) -> None:

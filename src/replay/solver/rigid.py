@@ -109,6 +109,7 @@ class Bodies:
         self._begin, self._end = layout.body_begin, layout.body_end
         self._external = loads[layout.n_free :].copy()
         self.inner = np.zeros_like(self._external)
+        self.impulse = np.zeros_like(self._external)
         self._lever = np.zeros_like(self._external)
         self._node_mass = node_mass[layout.n_free :]
         self._gravity = np.array(problem.controls.gravity_m_per_s2, float)
@@ -184,18 +185,42 @@ class Bodies:
     ) -> None:
         """Bring the velocities over the present time and find the pose at ``time + dt_drift``.
 
-        `inner` must hold the element forces on the tied nodes.
+        `inner` must hold the element forces on the tied nodes, `impulse` what contact gives them.
         """
+        self._velocity_before, self._spin_before = self.velocity.copy(), self.spin.copy()
         for body, motion in enumerate(self.motions):
             _pose_row(motion, time + dt_drift, self._told[body])
             self._next_centre[body] = self._told[body, 0:3]
             self._next_quaternion[body] = self._told[body, 3:7]
         advance_bodies(
-            nodal, self._first, self._begin, self._end, self.inner, self._external, self._lever, self._node_mass,
-            self.wrench, self.driven, self.mass, self.inverse_inertia, self._gravity, self.centre, self.quaternion,
-            self.velocity, self.spin, self._next_centre, self._next_quaternion, self.spin_before, self.twist, dt_kick,
-            dt_drift, speed_limit, self.sums,
+            nodal, self._first, self._begin, self._end, self.inner, self.impulse, self._external, self._lever,
+            self._node_mass, self.wrench, self.driven, self.mass, self.inverse_inertia, self._gravity, self.centre,
+            self.quaternion, self.velocity, self.spin, self._next_centre, self._next_quaternion, self.spin_before,
+            self.twist, dt_kick, dt_drift, speed_limit, self.sums,
         )  # fmt: skip
+
+    def kick_again(
+        self,
+        nodal: NDArray[np.float64],
+        before: NDArray[np.float64],
+        time: float,
+        dt_kick: float,
+        dt_drift: float,
+        speed_limit: float,
+    ) -> None:
+        """Repeat the last kick, with the impulses that contact has found; they are zero again afterwards.
+
+        Parameters
+        ----------
+        nodal, time, dt_kick, dt_drift, speed_limit
+            As in `kick`.
+        before : (n_tied, 3) float64
+            Velocities of the tied nodes before the kick [m/s].
+        """
+        nodal[self._first :, VELOCITY : VELOCITY + 3] = before
+        self.velocity[:], self.spin[:] = self._velocity_before, self._spin_before
+        self.kick(nodal, time, dt_kick, dt_drift, speed_limit)
+        self.impulse[:] = 0.0
 
     def drift(self) -> None:
         """Take the pose that `kick` has found; the nodes move by their velocities."""

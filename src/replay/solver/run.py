@@ -21,6 +21,7 @@ import replay
 from replay.errors import InstabilityError
 from replay.files import write_json
 from replay.solver.checkpoint import Checkpoints, Signals, code_hash, identity
+from replay.solver.contact.recorder import ContactRecorder
 from replay.solver.integrator import Integrator
 from replay.solver.link_histories import link_recorders
 from replay.solver.outputs import ENERGY_TABLE, Histories, States
@@ -61,6 +62,9 @@ class RunSummary:
         Last row of the ledger [J].
     energy_ratio_range
         Least and greatest energy ratio at history times.
+    contact
+        Steps with contact, share of them that did not converge, mean iterations, deepest penetration over the
+        face's size; empty without contact.
     state_hash
         SHA-256 of every array of the final state: equal for equal runs, whatever the number of threads.
     model_hash, code_hash, version
@@ -79,6 +83,7 @@ class RunSummary:
     mass_by_part_kg: dict[str, float]
     energies: dict[str, float]
     energy_ratio_range: tuple[float, float]
+    contact: dict[str, float]
     state_hash: str
     model_hash: str
     code_hash: str
@@ -120,6 +125,8 @@ class _Run:
         self, problem: Problem, folder: Path, recorders: Sequence[Recorder], resume: bool, stream: TextIO | None
     ) -> None:
         self.problem, self.folder, self.recorders = problem, folder, [*link_recorders(problem), *recorders]
+        if problem.contact is not None:
+            self.recorders.append(ContactRecorder(problem))
         self.controls = problem.controls
         self.progress = Progress(stream, self.controls.termination_time_s)
         self.integrator = Integrator(problem, speed_limit(problem))
@@ -254,6 +261,7 @@ class _Run:
             mass_by_part_kg=dict(zip(names, mass.tolist())),
             energies={f"{k}_J": v for k, v in dataclasses.asdict(energies).items()},
             energy_ratio_range=(float(ratio.min()), float(ratio.max())) if len(ratio) else (1.0, 1.0),
+            contact={} if integrator.contact is None else integrator.contact.summary(),
             state_hash=state_hash(integrator),
             model_hash=self.problem.digest(),
             code_hash=code_hash(),
@@ -296,8 +304,8 @@ def solve(
         Arrays and settings.
     folder
         Gets timestep.csv, energy.csv, part_energy.csv, histories.csv, states.vtkhdf, run.json; joints.csv,
-        straps.csv, ties.csv and rigid_sets.csv where the problem has any; what the recorders write; and while the
-        run lasts a folder ``checkpoint``.
+        straps.csv, ties.csv, contact.csv and rigid_sets.csv where the problem has any; what the recorders write; and
+        while the run lasts a folder ``checkpoint``.
     recorders
         See `Recorder`; called at every history time.
     threads

@@ -172,6 +172,12 @@ class StateView:
         """Work in stress, hourglass forces and bulk viscosity of every part (n_parts, 3) [J]."""
         return self._integrator.ledger.part_work.copy()
 
+    @property
+    def contact_sums(self) -> tuple[tuple[tuple[int, int], ...], NDArray[np.float64]]:
+        """Pairs of part indices that may touch, and impulse on the first (3) [N s], normal and friction loss [J]."""
+        contact = self._integrator.contact
+        return ((), np.zeros((0, 5))) if contact is None else (contact.pairs, contact.pair_sums.copy())
+
     @cached_property
     def momentum(self) -> NDArray[np.float64]:
         """Momentum of all that moves (3,) [N s]."""

@@ -74,8 +74,8 @@ turn = compiled(_turn)
 
 
 def _advance_bodies(
-    nodal, first_tied, begin, end, inner, external, lever, node_mass, wrench, driven, mass, inverse_inertia, gravity,
-    centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, twist, dt_kick, dt_drift,
+    nodal, first_tied, begin, end, inner, impulse, external, lever, node_mass, wrench, driven, mass, inverse_inertia,
+    gravity, centre, quaternion, velocity, spin, next_centre, next_quaternion, spin_before, twist, dt_kick, dt_drift,
     speed_limit, sums,
 ):  # fmt: skip
     """Kick every body, find its pose at the end of the step, and give its nodes the velocity that leads there.
@@ -88,8 +88,9 @@ def _advance_bodies(
         Row of the first tied node.
     begin, end : (n_bodies,) int64
         Tied nodes of each body, counted from `first_tied`.
-    inner, external, lever, node_mass : (n_tied, 3) or (n_tied,) float64
-        Element forces [N], loads [N], offset from the centre in the body frame [m], lumped mass [kg].
+    inner, impulse, external, lever, node_mass : (n_tied, 3) or (n_tied,) float64
+        Element forces [N], impulses of contact [N s], loads [N], offset from the centre in the body frame [m],
+        lumped mass [kg].
     wrench : (n_bodies, 6) float64
         Force [N] and torque about the centre [N m] of joints and straps, in space.
     driven : (n_bodies,) bool
@@ -126,6 +127,7 @@ def _advance_bodies(
             torque = moment
             for k in range(begin[body], end[body]):
                 f = add_scaled(_vector(external, k), -1.0, _vector(inner, k))
+                f = add_scaled(f, 1.0 / dt_kick, _vector(impulse, k))
                 total = add(total, f)
                 torque = add(torque, cross(apply(pose, _vector(lever, k)), f))
             old = _vector(velocity, body)
@@ -170,6 +172,7 @@ def _advance_bodies(
         )
         absorbed = 0.0
         loaded = 0.0
+        contact = 0.0
         square_before = 0.0
         square = 0.0
         runaways = 0.0
@@ -183,6 +186,7 @@ def _advance_bodies(
                 mean = 0.5 * dt_kick * (before + after)
                 absorbed += inner[k, axis] * mean
                 loaded += external[k, axis] * mean
+                contact += 0.5 * impulse[k, axis] * (before + after)
                 square_before += node_mass[k] * before * before
                 square += node_mass[k] * after * after
                 fast += after * after
@@ -190,16 +194,16 @@ def _advance_bodies(
             runaways += 0.0 if fast <= speed_limit * speed_limit else 1.0
         sums[body, 4] = runaways
         if driven[body]:
-            # whoever drives the body pays for its kinetic energy and for what elements, joints and straps take
+            # whoever drives the body pays for its kinetic energy and for what elements, joints, straps and contact take
             sums[body, 0] = 0.5 * square
             sums[body, 1] = absorbed
-            sums[body, 2] = 0.5 * (square - square_before) + absorbed - linked
+            sums[body, 2] = 0.5 * (square - square_before) + absorbed - linked - contact
             sums[body, 3] = 0.0
         else:
             sums[body, 0] = kinetic
             sums[body, 1] = absorbed
             sums[body, 2] = loaded + weight_work
-            sums[body, 3] = kinetic - kinetic_before + absorbed - loaded - weight_work - linked
+            sums[body, 3] = kinetic - kinetic_before + absorbed - loaded - weight_work - linked - contact
 
 
 def _present_twists(driven, told, quaternion, velocity, spin, inverse_inertia, twist):
