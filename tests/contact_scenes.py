@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from replay.solver import ContactControls, Controls, Material, Problem, SolverPart
 from replay.solver.blocks import structured_block
+from replay.solver.contact.projection import refuse_penetration
 from replay.solver.integrator import Integrator
 
 FREE = 1e12
@@ -64,8 +65,10 @@ def scene(
 class Steps:
     """A run step by step, with what the tests watch: energies, momentum, penetration."""
 
-    def __init__(self, problem: Problem, *, rigid_step_s: float = 1e-5) -> None:
+    def __init__(self, problem: Problem, *, rigid_step_s: float = 1e-5, check: bool = True) -> None:
         self.problem = problem
+        if check and problem.contact is not None:
+            refuse_penetration(problem)
         self.run = Integrator(problem, FREE)
         self._rigid_step = rigid_step_s
         assert self.run.contact is not None or problem.contact is None

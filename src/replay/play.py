@@ -298,6 +298,9 @@ class Helmet(Setting):
     cg_tolerance_m: Positive = Field(
         default=0.010, description="Agreement asked of the finite-element helmet's CG [m]."
     )
+    offset_m: Vector3 = Field(
+        default=(0.0, 0.0, 0.0), description="Displacement of the helmet from its nominal seat, head axes [m]."
+    )
     padding: str = Field(default="not recorded", description="Padding set and size (protocol 1.2).")
     chinstrap: str = Field(default="not recorded", description="Routing of the chin strap (protocol 1.2).")
 
@@ -339,6 +342,43 @@ class BulkViscosity(Setting):
     linear: NotNegative = Field(default=0.06, description="Linear coefficient.")
 
 
+class FrictionPair(Setting):
+    """Friction of two parts, or sets of parts."""
+
+    first: str = Field(description="Part or part set of the model, by name.", examples=["scalp"])
+    second: str = Field(description="Part or part set that it touches.", examples=["H1_pads_set1"])
+    friction: NotNegative = Field(description="Coulomb's coefficient.", examples=[0.5])
+
+
+class Contact(Setting):
+    """Global contact of all parts, protocol 3.2 and 3.3.5."""
+
+    scheme: Literal["lagrange"] = Field(
+        default="lagrange",
+        description="Lagrange multipliers on velocities (the article's scheme 3, constraint type 0).",
+    )
+    most_iterations: Annotated[int, Field(ge=1, le=1000)] = Field(
+        default=20, description="Iterations of the multipliers in a step, at most."
+    )
+    tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1.0e-3, description="Convergence tolerance of the multipliers."
+    )
+    points: Literal["corners", "center_plus_corners"] = Field(
+        default="center_plus_corners",
+        description="What may not pass a face: nodes, or centres too of faces about which the surface turns.",
+    )
+    friction: NotNegative = Field(default=0.0, description="Coefficient between parts that no pair names.")
+    pairs: tuple[FrictionPair, ...] = Field(
+        default=(
+            FrictionPair(first="scalp", second="H1_pads_set1", friction=0.5),
+            FrictionPair(first="scalp", second="H1_pads_set2", friction=0.5),
+            FrictionPair(first="scalp", second="chin_cup", friction=0.5),
+        ),
+        description="Friction by pair; a later one wins. Pads and chin cup on skin as in protocol 3.2.",
+    )
+    self_contact: tuple[str, ...] = Field(default=(), description="Parts or part sets that may touch themselves.")
+
+
 class SolverSettings(Setting):
     """Controls of the solver, protocol 3.3."""
 
@@ -347,6 +387,7 @@ class SolverSettings(Setting):
     )
     hourglass: Hourglass = Field(default_factory=lambda: Hourglass(), description="Hourglass stabilisation.")
     bulk_viscosity: BulkViscosity = Field(default_factory=lambda: BulkViscosity(), description="Bulk viscosity.")
+    contact: Contact = Field(default_factory=lambda: Contact(), description="Contact.")
     mass_scaling_time_step_s: NotNegative = Field(
         default=1.92e-7, description="Time step that mass scaling holds; 0 turns it off [s]."
     )

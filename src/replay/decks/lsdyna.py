@@ -70,7 +70,6 @@ def main_text(deck: DeckInput, includes: Sequence[str]) -> str:
         "*KEYWORD",
         f"$ {deck.title}",
         "$ units: m, kg, s, N, Pa, J (SI)",
-        "$ no *CONTACT: parts that touch share nodes",
         *(f"$ {note}" for note in deck.notes),
         "*TITLE",
         deck.title[:80],
@@ -114,12 +113,36 @@ def main_text(deck: DeckInput, includes: Sequence[str]) -> str:
             _fields("xc", "yc", "zc", "nx", "ny", "nz", "phase"),
             _card(*p, *direction, 0),
         ]
+    lines += _contact_lines(deck)
     lines += _driver_lines(deck)
     for lead, follower in tied_rigid_parts(deck):
         lines += ["*CONSTRAINED_RIGID_BODIES", "$ rigid parts that share nodes are one body", _card(lead, follower)]
     for include in includes:
         lines += ["*INCLUDE", include]
     return "\n".join([*lines, "*END"]) + "\n"
+
+
+def _contact_lines(deck: DeckInput) -> list[str]:
+    """A contact with friction for every friction pair whose sides the deck has."""
+    sets, parts = {part_set.sid for part_set in deck.part_sets}, {part.pid for part in deck.parts}
+    kinds = {kind.number: kind for kind in deck.friction_types}
+    lines = []
+    for pair in deck.friction_pairs:
+        if not ({pair.first, pair.second} <= sets | parts):
+            continue
+        kind = kinds[pair.friction_type]
+        types = [2 if number in sets else 3 for number in (pair.first, pair.second)]
+        lines += [
+            "*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE",
+            f"$ {pair.name}; 2: part set, 3: part",
+            _fields("surfa", "surfb", "surfatyp", "surfbtyp"),
+            _card(pair.first, pair.second, *types),
+            _fields("fs", "fd"),
+            _card(kind.static, kind.dynamic),
+            _fields("sfsa", "sfsb"),
+            _card(1.0, 1.0),
+        ]
+    return lines
 
 
 def mesh_text(deck: DeckInput, assembly: str) -> str:

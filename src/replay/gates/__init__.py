@@ -10,7 +10,7 @@ from replay.gates.model import Check, Gate, read_gate
 from replay.gates.numerics import PartEnergy, numerics_gate, part_energies
 from replay.gates.package import package_gate
 from replay.gates.reconstruction import video_reconstruction_gate, wearable_reconstruction_gate
-from replay.gates.shake import ledger_values, shake_gate
+from replay.gates.shake import contact_blow_up, ledger_values, shake_gate
 from replay.gates.verdict import PlayVerdict, play_verdict
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "PlayVerdict",
     "agreement_gate",
     "assembly_gate",
+    "contact_blow_up",
     "convergence_class",
     "fidelity_gate",
     "helmet_gate",

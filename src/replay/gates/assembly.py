@@ -8,7 +8,7 @@ from typing import Any
 from replay.gates.limits import Limits
 from replay.gates.model import Gate, Judge
 
-NO_CONTACT = "no contact in this model: pads share nodes with scalp and shell"
+NO_CONTACT = "no contact in this model"
 
 CHECKS = (
     "helmet_mass_difference_kg",
@@ -42,7 +42,7 @@ def assembly_gate(facts: Mapping[str, Any], limits: Limits, *, contact: Mapping[
         - ``head_mass_kg``; ``head_cg_offset_m``: distance of the head's centre of gravity
           from the origin of the head frame.
         - ``duplicate_part_ids``, ``parts_outside_block``: numbers of parts.
-        - ``unconnected_parts``: parts that share no node with another part.
+        - ``unconnected_parts``: parts that share no node with another part and that no strap holds.
         - ``min_scaled_jacobian``: over all elements.
     contact
         One entry per name of `CONTACT_CHECKS`, or None for a model without contact.

@@ -48,6 +48,32 @@ def ledger_values(energy: Mapping[str, ArrayLike], time_step_s: ArrayLike) -> di
     }
 
 
+def contact_blow_up(
+    contact_normal_J: ArrayLike, kinetic_J: ArrayLike, told: Mapping[str, float], limits: Limits
+) -> bool | None:
+    """Whether contact went unstable in the flight: it made energy, or left parts inside each other.
+
+    Parameters
+    ----------
+    contact_normal_J, kinetic_J
+        Columns of energy.csv.
+    told
+        ``contact`` of run.json; empty for a run without contact, which has no answer.
+    limits
+        Those of the replay's contact hold: ``numerics.contact_creation_share`` (here of the kinetic energy) and
+        ``numerics.penetration_over_edge``.
+    """
+    if not told:
+        return None
+    numerics = limits.of("numerics")
+    made = -float(np.min(contact_normal_J)) / float(np.max(kinetic_J))
+    verdicts = (
+        numerics["contact_creation_share"].judge(max(made, 0.0)),
+        numerics["penetration_over_edge"].judge(float(told["penetration_over_edge"])),
+    )
+    return "fail" in verdicts or not np.isfinite(made)
+
+
 def shake_gate(run: Mapping[str, Any], limits: Limits, *, contact_blow_up: bool | None = None) -> Gate:
     """Judge the free flight of the helmet with the controls of the replay.
 

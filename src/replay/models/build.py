@@ -30,9 +30,9 @@ SET_IDS = {
     "skull": 60000099,
 }
 NOTES = (
-    "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
+    "pads and chin cup touch the scalp by contact; pads share nodes with each other and with the shell",
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
-    "straps are not modelled; their anchors are node sets",
+    "straps are straight cables between chin cup and shell that touch nothing; the cup's outer face is its hard shell",
     "head surfaces are analytic (ellipsoids), not a person's anatomy",
 )
 STRUCTURE_ROLES = ("shell", "facemask")
@@ -136,6 +136,7 @@ def build_model(
             "guard_moved_nodes": int(moved),
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
             "helmet_structure": helmet_structure if helmet else None,
+            "strap": load_data("helmet.yaml")["strap"] if helmet else None,
             "notes": [*NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
         },
     )
@@ -167,7 +168,7 @@ def _mesh(
     outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet)
     mask = facemask_mesh(outer.nodes, outer.edge_quads, head.surfaces.scalp, helmet, setting.facemask_step_m)
     names = np.concatenate([names, outer.part, np.full(len(mask.hexes), "facemask")])
-    cup = np.setdiff1d(outer.hexes[outer.part == "chin_cup"], inner.scalp_nodes)
+    cup = np.unique(outer.hexes[outer.part == "chin_cup"][:, 4:])
     return mask.nodes, np.vstack([inner.hexes, outer.hexes, mask.hexes]), names, mask.mounts, cup
 
 
@@ -250,7 +251,7 @@ def _node_sets(
     """Mounts of the facemask, and where the chin strap goes: outer corners of the cup, lower edge of the shell."""
     if "shell" not in index:
         return {}
-    sets = {f"facemask_mount_{name}": rows for name, rows in mounts.items()}
+    sets = {f"facemask_mount_{name}": rows for name, rows in mounts.items()} | {"chin_cup_shell": cup}
     shell = np.unique(hexes[element_part == index["shell"]])
     for side, sign in (("left", 1), ("right", -1)):
         sets[f"chin_cup_strap_{side}"] = cup[[_furthest(nodes[cup], np.array([0.0, sign, 0.0]))]]

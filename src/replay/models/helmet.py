@@ -15,7 +15,7 @@ from replay.models.radial import RadialSurface, Smoothed, ray_stretch
 
 @dataclass(frozen=True)
 class HelmetMesh:
-    """Hexes of a helmet that stands on a head's scalp nodes.
+    """Hexes of a helmet that stands on a head's scalp.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def helmet_mesh(
 ) -> HelmetMesh:
     """Stand pads and shell on the scalp.
 
-    Until contact exists the pads share the scalp's nodes, and the chin cup too. Between pads a column is empty from
+    Pads and chin cup touch the scalp with nodes of their own: contact holds them. Between pads a column is empty from
     scalp to shell.
 
     Parameters
@@ -73,7 +73,7 @@ def helmet_mesh(
     base = np.maximum(liner(d), np.sqrt(np.einsum("ij,ij->i", skin, skin)))
     stretch = ray_stretch(liner, d)
     builder = _Builder(head.nodes, lattice.quads)
-    levels = [head.scalp_nodes]
+    levels = [builder.level(skin.copy())]
     start = np.sqrt(np.einsum("ij,ij->i", skin, skin))
     for name, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy), ("shell", 1)):
         base = base + stretch * thickness[name]
@@ -94,7 +94,7 @@ def helmet_mesh(
     edge_quads = np.stack([inner[rim[:, 0]], inner[rim[:, 1]], outer[rim[:, 1]], outer[rim[:, 0]]], axis=1)
     reach = ray_stretch(scalp, d) * helmet["chin"]["thickness_m"]
     cup = builder.level(skin + d * reach[:, None])
-    builder.extrude(levels[0], cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+    builder.extrude(builder.level(skin.copy()), cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
     return builder.finish(edge_quads)
 
 

@@ -12,8 +12,6 @@ from replay.models.model import Model
 from replay.models.quality import hex_volumes, scaled_jacobians
 
 PAD_SETS = ("H1_pads_set1", "H1_pads_set2")
-FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), (60009020, "chin_cup", 2))
-"""Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
 
 
 def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
@@ -155,11 +153,6 @@ def assembly_inspection(
         part.name for part in model.parts if not PID_BLOCKS[part.assembly][0] < part.pid <= PID_BLOCKS[part.assembly][1]
     ]
     loose = unconnected_parts(model)
-    unresolved = [
-        f"{pid}-{other}"
-        for pid, other, _ in FRICTION_PAIRS
-        if pid not in pids or not (model.part_sets.get(other) or other in {part.name for part in model.parts})
-    ]
     mass: float | str = "no mass of the physical helmet is given"
     if helmet_mass_kg is not None:
         mass = abs(helmet.mass_kg - helmet_mass_kg)
@@ -174,18 +167,18 @@ def assembly_inspection(
         "parts_outside_block_detail": ", ".join(outside),
         "unconnected_parts": len(loose),
         "unconnected_parts_detail": ", ".join(loose),
-        "unresolved_friction_pairs": len(unresolved),
-        "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
 
 
 def unconnected_parts(model: Model) -> list[str]:
-    """Names of the parts that share no node with another part."""
+    """Names of the parts that share no node with another part, and that no strap holds."""
     pairs = np.unique(np.stack([np.repeat(model.element_part, 8), model.hexes.ravel()], axis=1), axis=0)
     users = np.bincount(pairs[:, 1], minlength=len(model.nodes))
     tied = np.unique(pairs[users[pairs[:, 1]] > 1, 0])
-    return [part.name for k, part in enumerate(model.parts) if k not in tied]
+    strapped = [rows for name, rows in model.node_sets.items() if name.startswith("chin_cup_strap")]
+    held = np.unique(pairs[np.isin(pairs[:, 1], np.concatenate([np.empty(0, int), *strapped])), 0])
+    return [part.name for k, part in enumerate(model.parts) if k not in tied and k not in held]
 
 
 def _cg_offset(model: Model, measured_in_datum_m: np.ndarray | None) -> float | str:

@@ -101,6 +101,9 @@ class ReportInput:
     part_energy
         ``time_s``, ``part``, ``internal_J``, ``hourglass_J``: one row a part and time; with a
         column ``fluid`` (truth value) such parts are shown by their share of the whole.
+    contact
+        Rows of the pairs of parts that touched: ``first``, ``second``, ``peak_force_N``, ``impulse_N_s``,
+        ``normal_J``, ``friction_J``.
     head_measures
         Rows with ``name``, ``value``, ``unit``, ``definition``, ``source``.
     brain_histories
@@ -145,6 +148,7 @@ class ReportInput:
     time_step_floor_s: float | None = 1e-7
     mass_scaling_time_step_s: float | None = None
     part_energy: pd.DataFrame | None = None
+    contact: Sequence[Row] = ()
     head_measures: Sequence[Row] = ()
     brain_histories: pd.DataFrame | None = None
     convergence_class: str = "unknown"

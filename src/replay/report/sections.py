@@ -14,6 +14,12 @@ from replay.report.model import ReportInput
 from replay.report.verdict_view import gate_title
 
 _CONVERGED_BRAIN_ELEMENTS = 202_800
+_CONTACT_COLUMNS = {
+    "peak_force_N": "Greatest force, N",
+    "impulse_N_s": "Impulse, N s",
+    "normal_J": "Lost in closing, J",
+    "friction_J": "Lost in friction, J",
+}
 _CLASS_WORDS = {
     "A": "no regional strain or pressure changes by more than 5 % when the hourglass coefficient is halved",
     "B": "regional strain or pressure changes by 5 to 15 % when the hourglass coefficient is halved",
@@ -104,7 +110,7 @@ def motion_section(report: ReportInput, pictures: list[Picture]) -> str:
 
 
 def numerics_section(report: ReportInput, pictures: list[Picture]) -> str:
-    """Return energy, time step and hourglass energy."""
+    """Return energy, time step, hourglass energy, and what contact did."""
     drawn: list[Picture] = []
     if report.energy is not None:
         drawn += charts.energy_charts(report.energy)
@@ -112,7 +118,21 @@ def numerics_section(report: ReportInput, pictures: list[Picture]) -> str:
         drawn.append(charts.time_step_chart(report.timestep, report.time_step_floor_s, report.mass_scaling_time_step_s))
     if report.part_energy is not None:
         drawn.append(charts.hourglass_chart(report.part_energy))
-    return _figures(pictures, *drawn) if drawn else _not_run(report, "The solver")
+    content = _figures(pictures, *drawn) if drawn else _not_run(report, "The solver")
+    if report.contact:
+        rows = [
+            [text(pair["first"]), text(pair["second"]), *(number(pair[key]) for key in _CONTACT_COLUMNS)]
+            for pair in report.contact
+        ]
+        content += table(
+            "Contact by pair of parts",
+            ["Part", "touches", *_CONTACT_COLUMNS.values()],
+            rows,
+            numeric=range(2, 2 + len(_CONTACT_COLUMNS)),
+            note="Forces are means over a history interval. What friction and closing faces lose is in the ledger.",
+            stack=True,
+        )
+    return content
 
 
 def brain_section(report: ReportInput, pictures: list[Picture]) -> str:

@@ -6,6 +6,7 @@ of plays, heads or helmets. The physics is in `kernels`; docs/physics.md gives t
 """
 
 from replay.solver.contact import ContactControls, ContactPair
+from replay.solver.contact.projection import PENETRATION_TABLE, Seating, penetration_table, seat, seated
 from replay.solver.contact.recorder import CONTACT_TABLE
 from replay.solver.joints import Joint
 from replay.solver.kernels import source_hash
@@ -28,6 +29,7 @@ __all__ = [
     "HISTORY_TABLE",
     "LAWS",
     "PART_ENERGY_TABLE",
+    "PENETRATION_TABLE",
     "TIME_STEP_TABLE",
     "ContactControls",
     "ContactPair",
@@ -41,6 +43,7 @@ __all__ = [
     "Recorder",
     "RigidSet",
     "RunSummary",
+    "Seating",
     "SolverPart",
     "StateView",
     "Strap",
@@ -50,8 +53,11 @@ __all__ = [
     "law_parameters",
     "node_recorder",
     "outer_faces",
+    "penetration_table",
     "pose_at",
     "read_motion",
+    "seat",
+    "seated",
     "solve",
     "source_hash",
     "tie_surfaces",

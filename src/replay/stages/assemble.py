@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from replay import gates, models
 from replay.files import write_json
 from replay.gates.assembly import CHECKS as ASSEMBLY_CHECKS
 from replay.gates.helmet import CHECKS as HELMET_CHECKS
+from replay.models import Model
+from replay.play import Play
+from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.frame import Stage, Workspace
+from replay.stages.problem import controls_of, resting_problem, unresolved_pairs
 from replay.stages.settings import read_settings
 from replay.stages.verdict import limits_of
+
+_MOST_PLACES = 4
 
 
 def run(workspace: Workspace) -> str | None:
@@ -25,6 +34,7 @@ def run(workspace: Workspace) -> str | None:
         helmet_mass_kg=play.helmet.mass_kg,
         helmet_structure=play.model.helmet_structure,
     )
+    model, contact = seat_helmet(stage, play, model)
     print(models.summary_text(model))
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
     models.write_parts_table(stage.write("parts.csv", "parts with material, volume, mass and quality"), model)
@@ -41,11 +51,42 @@ def run(workspace: Workspace) -> str | None:
     )
     judged = [
         gates.helmet_gate(_told(helmet, HELMET_CHECKS), limits),
-        gates.assembly_gate(_told(assembly, ASSEMBLY_CHECKS), limits),
+        gates.assembly_gate(_told(assembly, ASSEMBLY_CHECKS), limits, contact=contact),
     ]
     judged[0].write(stage.write("gate_helmet.json", "gate: helmet readiness"))
     judged[1].write(stage.write("gate.json", "gate: assembly"))
     return stage.finish(judged, parameters=dict(model.info))
+
+
+def seat_helmet(stage: Stage, play: Play, model: Model) -> tuple[Model, dict[str, Any]]:
+    """Put the helmet where the play has it, and take out what then lies inside the head (protocol 3.1).
+
+    Returns
+    -------
+    tuple of Model and dict
+        The model with its moved nodes, and what the assembly gate asks of contact.
+    """
+    nodes = model.nodes.copy()
+    nodes[np.unique(model.hexes[model.elements_of(assembly="helmet")])] += np.array(play.helmet.offset_m)
+    model = dataclasses.replace(model, nodes=nodes)
+    problem = resting_problem(model, controls_of(play, 1.0, checkpoint_every_s=0.0), play.solver.contact)
+    found = seat(problem)
+    PENETRATION_TABLE.write(
+        stage.write("penetrations.csv", "initial penetrations: nodes inside, and nodes moved (protocol 3.1)"),
+        penetration_table(found, problem),
+    )
+    places = found.places([part.name for part in model.parts], nodes)
+    before = f"{1e3 * found.deepest_before_m:.3g} mm before; {len(found.rows)} nodes in penetrations.csv"
+    unresolved = unresolved_pairs(model, play.solver.contact)
+    return dataclasses.replace(model, nodes=found.nodes), {
+        "initial_penetration_m": found.deepest_m,
+        "initial_penetration_m_detail": "; ".join([before, *places[:_MOST_PLACES]]) if places else "",
+        "projection_over_edge": found.share_moved,
+        "projection_over_edge_detail": "; ".join(places[:_MOST_PLACES]),
+        "projection_jacobian_ratio": found.volume_ratio,
+        "unresolved_friction_pairs": len(unresolved),
+        "unresolved_friction_pairs_detail": ", ".join(unresolved),
+    }
 
 
 def _told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:

@@ -23,6 +23,7 @@ RUN_FILES = {
     "energy.csv": "energy ledger",
     "part_energy.csv": "energy by part",
     "histories.csv": "motion of parts",
+    "contact.csv": "contact by pair of parts: force, impulse, work",
     "states.vtkhdf": "states of the whole mesh, for ParaView",
     "states.xdmf": "the same for VisIt",
 }
@@ -64,7 +65,7 @@ def run_driven(
     controls = controls_of(
         play, play.window.duration_s, checkpoint_every_s=checkpoint_every_s, hourglass_factor=hourglass_factor
     )
-    problem = driven_problem(model, driver, controls)
+    problem = driven_problem(model, driver, controls, play.solver.contact)
     return run_solver(stage, problem, [brain_recorder(model)], {**RUN_FILES, **BRAIN_FILES}, threads=threads)
 
 
@@ -106,7 +107,26 @@ def judge_numerics(stage: Stage) -> Gate:
         {"ran_to_end": summary["ran_to_end"], **run_numbers(summary)},
         limits_of(stage),
         steps=steps["step"].to_numpy(),
+        contact=contact_numbers(summary, energy),
     )
+
+
+def contact_numbers(summary: dict, energy: pd.DataFrame) -> dict[str, float | str] | None:
+    """What the gates ask about contact, from ``run.json`` and ``energy.csv``; None for a run without contact."""
+    told = summary["contact"]
+    if not told:
+        return None
+    internal = float(energy["internal_J"].max())
+    made = max(0.0, -float(energy["contact_normal_J"].min()))
+    # the ledger's friction is a loss; work of 1e-12 of what there is, is rounding
+    friction = -float(energy["friction_J"].min())
+    return {
+        "contact_creation_share": made / internal if internal > 0 else "the run has no internal energy",
+        "friction_work_J": friction if friction > 1e-12 * internal else -float(energy["friction_J"].max()),
+        "contact_unconverged_share": told["unconverged_share"] if told["steps"] else "nothing touched",
+        "contact_unconverged_share_detail": f"{told['mean_iterations']:.1f} iterations a step",
+        "penetration_over_edge": told["penetration_over_edge"],
+    }
 
 
 def run_numbers(summary: dict) -> dict[str, float | str]:

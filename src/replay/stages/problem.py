@@ -6,8 +6,18 @@ import numpy as np
 
 from replay.models import Model, select_assembly
 from replay.motion import Kinematics
-from replay.play import Play
-from replay.solver import Controls, Material, PrescribedMotion, Problem, SolverPart
+from replay.play import Contact, Play
+from replay.solver import (
+    ContactControls,
+    ContactPair,
+    Controls,
+    Material,
+    PrescribedMotion,
+    Problem,
+    RigidSet,
+    SolverPart,
+    Strap,
+)
 
 
 def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hourglass_factor: float = 1.0) -> Controls:
@@ -39,11 +49,60 @@ def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hou
     )
 
 
-def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Problem:
+def part_numbers(model: Model, name: str) -> tuple[int, ...]:
+    """Numbers of the part, or of the parts of the set, of this name; none if there is neither."""
+    if name in model.part_sets:
+        return model.part_sets[name]
+    return tuple(part.pid for part in model.parts if part.name == name)
+
+
+def unresolved_pairs(model: Model, contact: Contact) -> list[str]:
+    """Friction pairs, and names of self-contact, of which the model lacks a side."""
+    pairs = [
+        f"{pair.first}-{pair.second}"
+        for pair in contact.pairs
+        if not (part_numbers(model, pair.first) and part_numbers(model, pair.second))
+    ]
+    return pairs + [name for name in contact.self_contact if not part_numbers(model, name)]
+
+
+def contact_of(model: Model, contact: Contact) -> ContactControls:
+    """Contact of the parts that a model has; pairs of which it lacks a side are left out."""
+    pairs = []
+    for pair in contact.pairs:
+        first, second = part_numbers(model, pair.first), part_numbers(model, pair.second)
+        if first and second:
+            pairs.append(ContactPair(first, second, pair.friction, name=f"{pair.first}-{pair.second}"))
+    itself = [pid for name in contact.self_contact for pid in part_numbers(model, name)]
+    return ContactControls(
+        most_iterations=contact.most_iterations,
+        tolerance=contact.tolerance,
+        points=contact.points,
+        friction=contact.friction,
+        pairs=tuple(pairs),
+        self_contact=tuple(dict.fromkeys(itself)),
+    )
+
+
+def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
+    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
+    sets, data = model.node_sets, model.info["strap"]
+    straps = []
+    for side in ("left", "right"):
+        for end in ("front", "rear"):
+            cup, anchor = sets.get(f"chin_cup_strap_{side}"), sets.get(f"strap_anchor_{end}_{side}")
+            if cup is not None and anchor is not None:
+                rows = np.array([anchor[0], cup[0]], np.int64)
+                straps.append(Strap(f"chin_{end}_{side}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
+    shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
+    return shell, tuple(straps)
+
+
+def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact: Contact) -> Problem:
     """Head and helmet with the skull driven along the play's motion.
 
     The model stands at the driver's first pose and moves as one rigid body with its first velocity, so that
-    nothing is strained before the impact.
+    nothing is strained before the impact. The helmet is held by contact and by its chin straps alone.
 
     Parameters
     ----------
@@ -53,7 +112,10 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Prob
         ``driver_6dof.csv``: the motion of that centre, global axes.
     controls
         Numerical settings.
+    contact
+        The play's ``solver.contact`` block.
     """
+    shell, straps = chin_straps(model)
     arms = driver.rotation[0].apply(model.nodes)
     parts = solver_parts(model)
     return Problem(
@@ -75,11 +137,28 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls) -> Prob
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
+        rigid_sets=shell,
+        straps=straps,
+        contact=contact_of(model, contact),
     )
 
 
-def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Problem:
-    """The helmet alone in free flight along x (protocol 1.6); nodes it shared with the head are free.
+def resting_problem(model: Model, controls: Controls, contact: Contact) -> Problem:
+    """Head and helmet at rest, as assembled: what initial penetration is looked for in."""
+    return Problem(
+        nodes=model.nodes,
+        hexes=model.hexes,
+        element_part=model.element_part,
+        parts=solver_parts(model),
+        controls=controls,
+        node_ids=model.node_ids,
+        element_ids=model.element_ids,
+        contact=contact_of(model, contact),
+    )
+
+
+def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls, contact: Contact) -> Problem:
+    """The helmet alone in free flight along x (protocol 1.6).
 
     Parameters
     ----------
@@ -89,8 +168,11 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Pr
         Initial speed of the whole helmet.
     controls
         Those of the replay, for a shorter time.
+    contact
+        That of the replay.
     """
     helmet = select_assembly(model, "helmet")
+    shell, straps = chin_straps(helmet)
     return Problem(
         nodes=helmet.nodes,
         hexes=helmet.hexes,
@@ -100,6 +182,9 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls) -> Pr
         initial_velocity=np.tile([speed_m_per_s, 0.0, 0.0], (len(helmet.nodes), 1)),
         node_ids=helmet.node_ids,
         element_ids=helmet.element_ids,
+        rigid_sets=shell,
+        straps=straps,
+        contact=contact_of(helmet, contact),
     )
 
 

@@ -31,14 +31,14 @@ _TITLES = {
     "fidelity": "Driver fidelity",
     "measures": "Measures",
 }
-_WITHOUT_CONTACT = (
-    (
-        "Sliding, lift-off and bottoming out of the helmet. There is no contact in this model: pads share nodes with"
-        " scalp and shell, so the helmet stays joined to the head."
-    ),
+_DRIVEN = (
     (
         "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
-        " and facemask forces, contact work and the action of an impactor are not computed."
+        " and facemask forces and the action of an impactor are not computed."
+    ),
+    (
+        "How tightly the helmet sat. Pads and chin cup touch the head without pressure at the start, and straps are"
+        " taut without tension: hair, sweat and pre-load are not modelled."
     ),
     "Damage. The brain is visco-elastic here; the article's damage variable is not computed.",
 )
@@ -84,7 +84,7 @@ def collect(stage: Stage) -> ReportInput:
         "parts": _parts(stage, model),
         "parameters": _parameters(model),
         "mesh": _mesh(model),
-        "cannot_show": [*_WITHOUT_CONTACT, _STRUCTURE[play.model.helmet_structure], *quality["warnings"]],
+        "cannot_show": [*_DRIVEN, _STRUCTURE[play.model.helmet_structure], *quality["warnings"]],
         "inputs": inputs["files"],
         "provenance": _provenance(stage, model),
         "mass_scaling_time_step_s": play.solver.mass_scaling_time_step_s,
@@ -111,6 +111,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "energy": _table(stage, "replay", "energy.csv"),
         "timestep": _table(stage, "replay", "timestep.csv").query("step > 0"),
         "part_energy": energy.assign(fluid=energy["pid"].isin(fluid)),
+        "contact": _contact(stage),
         "head_measures": measures["head"],
         "brain_histories": _table(stage, "replay", "brain_histories.csv"),
         "convergence_class": measures["brain_convergence_class"],
@@ -118,6 +119,27 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
     }
+
+
+def _contact(stage: Stage) -> list[dict[str, Any]]:
+    """Pairs of parts that touched, the one with the greatest force first."""
+    table = _table(stage, "replay", "contact.csv")
+    rows = []
+    for (first, second), pair in table.groupby(["part_a", "part_b"], sort=False):
+        force = np.sqrt((pair[["force_x_N", "force_y_N", "force_z_N"]].to_numpy() ** 2).sum(axis=1))
+        last = pair.iloc[-1]
+        impulse = np.sqrt((last[["impulse_x_N_s", "impulse_y_N_s", "impulse_z_N_s"]].to_numpy(float) ** 2).sum())
+        rows.append(
+            {
+                "first": first,
+                "second": second,
+                "peak_force_N": float(force.max()),
+                "impulse_N_s": float(impulse),
+                "normal_J": float(last["normal_J"]),
+                "friction_J": float(last["friction_J"]),
+            }
+        )
+    return sorted(rows, key=lambda row: -row["peak_force_N"])
 
 
 def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 
 from replay.files import read_json
-from replay.gates import ledger_values, shake_gate
+from replay.gates import contact_blow_up, ledger_values, shake_gate
 from replay.measures import ShakeRecorder, shake_measures
 from replay.models import read_model
 from replay.stages.frame import Stage, Workspace
@@ -23,7 +23,7 @@ def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s:
     play = read_settings(stage)
     model = read_model(stage.read("assembly", "model.h5"))
     controls = controls_of(play, play.shake.duration_s, checkpoint_every_s=checkpoint_every_s)
-    problem = helmet_problem(model, play.shake.speed_m_per_s, controls)
+    problem = helmet_problem(model, play.shake.speed_m_per_s, controls, play.solver.contact)
     recorder = ShakeRecorder(
         problem.hexes,
         problem.nodes,
@@ -38,13 +38,16 @@ def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s:
     if refusal:
         return refusal
     steps = pd.read_csv(stage.folder / "timestep.csv")["time_step_s"]
+    energy, summary = pd.read_csv(stage.folder / "energy.csv"), read_json(stage.folder / "run.json")
+    limits = limits_of(stage)
     gate = shake_gate(
         {
             **shake_measures(pd.read_csv(stage.folder / "shake.csv")),
-            **ledger_values(pd.read_csv(stage.folder / "energy.csv"), steps),
-            "ran_to_end": read_json(stage.folder / "run.json")["ran_to_end"],
+            **ledger_values(energy, steps),
+            "ran_to_end": summary["ran_to_end"],
         },
-        limits_of(stage),
+        limits,
+        contact_blow_up=contact_blow_up(energy["contact_normal_J"], energy["kinetic_J"], summary["contact"], limits),
     )
     gate.write(stage.write("gate.json", "gate: helmet shake"))
     return stage.finish([gate])

@@ -12,11 +12,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.solver.contact.rooms import mesh_of, room_for_hits, room_for_slots
 from replay.solver.contact.search import Search
 from replay.solver.contact.settings import SOLVERS, ContactControls, PairTable, pair_table
 from replay.solver.contact.surface import Surface, extract_surface
 from replay.solver.kernels import contact_work as work
-from replay.solver.kernels.contact_detect import SLOTS, Hits, Mesh, Slots, detect
+from replay.solver.kernels.contact_detect import SLOTS, detect
 from replay.solver.kernels.contact_solve import solve
 from replay.solver.kernels.contact_system import CORNERS, Carriers, Constraints, Nodes, assemble, carry, weigh
 from replay.solver.kernels.lanes import VELOCITY
@@ -83,18 +84,13 @@ class Contact:
         self._table: PairTable = pair_table(controls, pids)
         self.pairs, self._pair_row = _pairs(surface, self._table.active)
         self._part, self._point_part = surface.part, surface.point_parts()
-        self._mesh = Mesh(
-            surface.faces, surface.nodes, surface.first_face, surface.node_faces, surface.body, surface.point_bodies()
-        )
+        self._mesh = mesh_of(surface)
         awake = slave_points(surface, nodal[:, :3], controls)
         self._search = Search(surface, self._mesh, self._table.active, carrier, awake, nodal[:, :3])
         self._carrier, self._bodies = carrier, bodies
         self._method = SOLVERS.index(controls.solver)
         points = surface.n_points
-        self._slots = Slots(
-            np.full((points, SLOTS), -1, np.int64), np.zeros((points, SLOTS)), np.zeros((points, SLOTS, 3)),
-            np.zeros((points, SLOTS, 4)), np.ones((points, SLOTS)), np.zeros((points, SLOTS), np.bool_),
-        )  # fmt: skip
+        self._slots = room_for_slots(points)
         self._old_face = np.full((points, SLOTS), -1, np.int64)
         self._old_impulse, self._old_drag = np.zeros((points, SLOTS)), np.zeros((points, SLOTS, 3))
         self._depth = np.zeros(points)
@@ -104,7 +100,7 @@ class Contact:
         self._number = np.full(n_nodes, -1, np.int64)
         count = bodies.count
         self._carriers = Carriers(np.zeros(count), np.zeros((count, 3, 3)), np.zeros((count, 3)), np.zeros((count, 3)))
-        self._hits = _hits(0)
+        self._hits = room_for_hits(0)
         self._reserve(64)
         #: Sums over pairs of parts since time 0, see `kernels.contact_work.PAIR_SUMS`.
         self.pair_sums = np.zeros((len(self.pairs), work.PAIR_SUMS))
@@ -169,7 +165,7 @@ class Contact:
         reach = dt * closing + 2.0 * _NEAR_SHARE * self._search.longest_edge
         self._search.update(nodal, dt, reach + float(self._depth.max(initial=0.0)))
         if len(self._hits.distance) < len(self._search.candidates):
-            self._hits = _hits(len(self._search.candidates))
+            self._hits = room_for_hits(len(self._search.candidates))
         detect(
             nodal, self._mesh, self._search.points, self._search.first, self._search.candidates, reach, dt,
             _NEAR_SHARE, self._old_face, self._depth, self._hits, self._slots,
@@ -275,10 +271,6 @@ class Contact:
         for name, array in self.arrays().items():
             array[...] = arrays[name]
         self._search.forget()
-
-
-def _hits(n: int) -> Hits:
-    return Hits(*(np.zeros(n) for _ in range(6)), np.zeros(n, np.bool_))
 
 
 def _pairs(surface: Surface, active: NDArray[np.bool_]) -> tuple[tuple[tuple[int, int], ...], NDArray[np.int64]]:

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from replay.errors import InputError
 from replay.solver.contact.contact import slave_points
+from replay.solver.contact.rooms import mesh_of, room_for_hits, room_for_slots
 from replay.solver.contact.search import Search
 from replay.solver.contact.settings import WHERE, ContactControls, pair_table
 from replay.solver.contact.surface import Surface, extract_surface
-from replay.solver.kernels.contact_detect import SLOTS, Hits, Mesh, Slots, penetrations
+from replay.solver.kernels.contact_detect import penetrations
 from replay.solver.kernels.lanes import NODE_COLUMNS
 from replay.solver.problem import Problem, gradients
 from replay.tables import Column, TableFormat
@@ -29,6 +30,8 @@ MOST_MOVE = 0.3
 LEAST_VOLUME = 0.1
 #: A point this share of the typical edge inside a face is not inside.
 TOUCHING = 1e-6
+# a point this share of a face's size inside it is not taken for one that touches
+_STARTS_INSIDE = 1e-3
 _MOST_ROUNDS = 400
 _MOST_PLACES = 6
 
@@ -125,9 +128,7 @@ class _Prober:
         tied = np.concatenate([np.empty(0, np.int64), *(tie.nodes for tie in problem.ties)])
         self.surface: Surface = extract_surface(problem.hexes, problem.element_part, n, tied)
         surface = self.surface
-        self._mesh = Mesh(
-            surface.faces, surface.nodes, surface.first_face, surface.node_faces, surface.body, surface.point_bodies()
-        )
+        self._mesh = mesh_of(surface)
         table = pair_table(controls, [part.pid for part in problem.parts])
         awake = slave_points(surface, problem.nodes, controls)
         loose = np.full(n, -1, np.int64)
@@ -135,19 +136,14 @@ class _Prober:
         self.edge = self._search.edge
         # anything deeper than this is refused for its neighbours, which are not as deep
         self._reach = 2.0 * self._search.longest_edge
-        points = surface.n_points
-        self.slots = Slots(
-            np.full((points, SLOTS), -1, np.int64), np.zeros((points, SLOTS)), np.zeros((points, SLOTS, 3)),
-            np.zeros((points, SLOTS, 4)), np.ones((points, SLOTS)), np.zeros((points, SLOTS), np.bool_),
-        )  # fmt: skip
+        self.slots = room_for_slots(surface.n_points)
         self._nodal = np.zeros((n, NODE_COLUMNS))
 
     def probe(self, nodes: NDArray[np.float64]) -> NDArray[np.int64]:
         """Slave points inside something, with their face, gap, normal and shares in slot 0 of `slots`."""
         self._nodal[:, :3] = nodes
         self._search.update(self._nodal, 0.0, self._reach)
-        n = len(self._search.candidates)
-        hits = Hits(*(np.zeros(n) for _ in range(6)), np.zeros(n, np.bool_))
+        hits = room_for_hits(len(self._search.candidates))
         penetrations(
             self._nodal, self._mesh, self._search.points, self._search.first, self._search.candidates, self._reach,
             hits, self.slots,
@@ -241,15 +237,39 @@ def seated(problem: Problem) -> tuple[Problem, Seating]:
     """
     found = seat(problem)
     if not found.sound:
-        places = found.places([part.name for part in problem.parts], problem.nodes)
-        more = f"; {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
         raise InputError(
-            WHERE, "parts lie inside each other: " + "; ".join(places[:_MOST_PLACES]) + more,
+            WHERE, _sentence(found, problem),
             expected=f"moves of at most {MOST_MOVE:g} of a node's shortest edge (this takes {found.share_moved:.2g}), "
             f"volumes of at least {LEAST_VOLUME:g} of what they were (this leaves {found.volume_ratio:.2g})",
             mend="seat the parts apart in the mesh; projection is for small overlaps",
         )  # fmt: skip
     return (problem if not len(found.rows) else dataclasses.replace(problem, nodes=found.nodes)), found
+
+
+def refuse_penetration(problem: Problem) -> None:
+    """Refuse a problem whose parts lie inside each other at time 0.
+
+    Raises
+    ------
+    InputError
+        With the parts and places.
+    """
+    if problem.contact is None:
+        return
+    prober = _Prober(problem, problem.contact)
+    inside = prober.probe(problem.nodes)
+    deep = -prober.slots.gap[inside, 0] > _STARTS_INSIDE * prober.slots.size[inside, 0]
+    if deep.any():
+        raise InputError(
+            WHERE, _sentence(seat(problem), problem), expected="parts that touch or stand apart at the start",
+            mend="take small overlaps out with replay.solver.contact.projection.seated, or seat the parts apart",
+        )  # fmt: skip
+
+
+def _sentence(found: Seating, problem: Problem) -> str:
+    places = found.places([part.name for part in problem.parts], problem.nodes)
+    more = f"; {len(places) - _MOST_PLACES} more" if len(places) > _MOST_PLACES else ""
+    return "parts lie inside each other: " + "; ".join(places[:_MOST_PLACES]) + more
 
 
 def penetration_table(found: Seating, problem: Problem) -> dict[str, list]:
@@ -278,7 +298,7 @@ def _mobility(problem: Problem) -> NDArray[np.float64]:
     density = np.array([part.material.density_kg_per_m3 for part in problem.parts])[problem.element_part]
     mass = np.bincount(problem.hexes.ravel(), np.repeat(volume * density / 8, 8), len(problem.nodes))
     rigid = np.array([part.material.is_rigid for part in problem.parts])[problem.element_part]
-    held = problem.fixed.any(axis=1)
+    held = np.array(problem.fixed.any(axis=1))
     held[problem.hexes[rigid]] = True
     return np.where(held, 0.0, 1.0 / mass)
 
