@@ -50,9 +50,9 @@ def run(seed: int, threads: int) -> tuple[Steps, str]:
     march = Steps(problem)
     longest = max(np.ptp(problem.nodes[problem.hexes[problem.element_part == k]].reshape(-1, 3), axis=0).max()
                   for k in (0, 1))  # fmt: skip
-    speed = np.abs(problem.initial_velocity).max()
-    # until the gap is closed and a wave has gone there and back
-    end = 4e-4 / speed + 3 * longest / np.sqrt(10.0**6.5 / 1400.0)
+    speed = np.linalg.norm(problem.initial_velocity, axis=1).max()
+    # until corners that do not point at each other have met, and a wave has gone through an element and back
+    end = (4e-4 + 0.6 * np.ptp(problem.nodes, axis=0).min()) / speed + 3 * longest / np.sqrt(10.0**6.5 / 1400.0)
     for _ in range(400):
         march.step()
         if march.run.time_s > end:

@@ -33,7 +33,7 @@ def test_rigid_impact(
     velocity = march.run.bodies.velocity[:, 0]
     report(name, "velocity of 1 kg [m/s]", first, velocity[0], 1e-12)
     report(name, "velocity of 3 kg [m/s]", second, velocity[1], 1e-12)
-    report(name, "energy lost [J]", lost, march.run.energies().contact_normal, 1e-12)
+    report(name, "energy lost over all there is", lost / 2, march.run.energies().contact_normal / 2, 1e-12)
     assert np.abs(march.momentum - march.momentum0).max() < 1e-12 * 2.0
 
 
@@ -44,7 +44,7 @@ def test_restitution_in_between() -> None:
 
 def test_momentum_and_impulses_balance_to_rounding(report: Callable[..., None]) -> None:
     blocks = [
-        Block((4, 4, 3), (0.04, 0.04, 0.03), (0.003, 0.002, 0.0152), elastic(1e7, 0.3, 1000.0), (1.0, 0.5, -3.0),
+        Block((4, 4, 3), (0.04, 0.04, 0.03), (0.003, 0.002, 0.0172), elastic(1e7, 0.3, 1000.0), (1.0, 0.5, -3.0),
               turn_deg=(4, -3, 20)),
         Block((5, 5, 3), (0.06, 0.06, 0.03), (0, 0, -0.0165), elastic(2e7, 0.3, 3000.0), (0, 0, 0.5)),
     ]  # fmt: skip
@@ -57,7 +57,7 @@ def test_momentum_and_impulses_balance_to_rounding(report: Callable[..., None]) 
         return np.asarray(np.einsum("n,ni->i", march.run.mass[:n][of_first], rows))
 
     start = momentum_of_first()
-    march.until(1.5e-3)
+    march.until(2e-3)
     contact = march.run.contact
     assert contact is not None
     impulse = contact.pair_sums[0, :3]
