@@ -163,7 +163,7 @@ def test_inspection_finds_nothing_missing(model: Model) -> None:
     assert isinstance(helmet["cg_offset_m"], str)
     facts = assembly_inspection(model, helmet_mass_kg=1.90)
     assert facts["helmet_mass_difference_kg"] == pytest.approx(0.07)
-    for name in ("duplicate_part_ids", "parts_outside_block", "unconnected_parts", "unresolved_friction_pairs"):
+    for name in ("duplicate_part_ids", "parts_outside_block", "unconnected_parts"):
         assert facts[name] == 0
 
 
@@ -175,7 +175,7 @@ def test_inspection_names_what_is_missing(tiny: Model) -> None:
     assert "H1_pads_set1" in missing
     assert "facemask mount brow left" in missing
     assert "strap_anchor_rear right" in missing
-    assert assembly_inspection(bare)["unresolved_friction_pairs"] == 1
+    assert assembly_inspection(bare)["unconnected_parts_detail"] == "chin_cup"
     # Cut the facemask's nodes loose.
     own = tiny.hexes.copy()
     mask = tiny.elements_of(role="facemask")
