@@ -328,7 +328,10 @@ class ModelChoice(Setting):
 class Hourglass(Setting):
     """Hourglass stabilisation, protocol 3.3.2."""
 
-    method: Literal["stiffness", "viscous"] = Field(default="stiffness", description="Form of the stabilisation.")
+    method: Literal["stiffness", "selective", "viscous"] = Field(
+        default="stiffness",
+        description="Form of the stabilisation; `selective` is a stiffness form that tells bending from twisting.",
+    )
     coefficient: Annotated[Number, Field(ge=0, le=0.3)] = Field(default=0.10, description="Coefficient.")
 
 
