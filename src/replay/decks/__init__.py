@@ -12,7 +12,7 @@ from replay.decks.deck import (
     axis_through,
     deck_parts,
 )
-from replay.decks.keyword_reader import read_keyword
+from replay.decks.keyword import KeywordDeck, read_keyword
 from replay.decks.lsdyna import write_lsdyna
 from replay.decks.velodyne import read_velodyne, write_velodyne
 
@@ -24,6 +24,7 @@ __all__ = [
     "FrictionPair",
     "FrictionType",
     "InitialVelocity",
+    "KeywordDeck",
     "PartSet",
     "axis_through",
     "deck_parts",
