@@ -30,7 +30,7 @@ class NodeRows:
 
 @dataclass(frozen=True)
 class ElementRows:
-    """Elements of one block: numbers (m,), parts (m,), node numbers (m, k) with 0 where there is none, lines (m,)."""
+    """Elements of one block: numbers (m,), parts (m,), node numbers (m, 10) with 0 where there is none, lines (m,)."""
 
     ids: np.ndarray
     parts: np.ndarray
@@ -88,7 +88,8 @@ def read_elements(block: Block, parameters: Mapping[str, Value], *, shell: bool)
     if quick is not None:
         columns = _all([_whole(column) for column in quick])
         if columns and min(column.min() for column in columns[:3]) > 0:
-            nodes = np.stack(columns[2:], axis=1)
+            nodes = np.zeros((len(columns[0]), 10), dtype=np.int64)
+            nodes[:, : len(columns) - 2] = np.stack(columns[2:], axis=1)
             return ElementRows(columns[0], columns[1], nodes, _numbers(lines[::2] if two else lines))
     return _elements_line_by_line(lines, number, parameters, shell=shell)
 

@@ -233,6 +233,9 @@ def _gather(reading: _Reading) -> None:
                 files,
                 lines,
             )
+            if name == "solids":  # a tetrahedron may stand there with its four nodes alone
+                four = (rows.nodes[:, :4] != 0).all(axis=1) & (rows.nodes[:, 4:] == 0).all(axis=1)
+                rows.nodes[four, 4:8] = rows.nodes[four, 3:4]
             setattr(deck, name, rows.only(_first_of(rows.ids, "element", deck, files, lines)))
     shared = np.intersect1d(deck.solids.ids, deck.shells.ids)
     if len(shared) and len(deck.solids.ids):
@@ -277,25 +280,26 @@ def _check_references(reading: _Reading) -> None:
     """Refuse elements whose nodes are not there."""
     deck = reading.deck
     known = np.sort(deck.node_ids)
-    for elements, needed in ((deck.solids, 4), (deck.shells, 3)):
+    for elements, needed in ((deck.solids, 8), (deck.shells, 3)):
         if not len(elements.ids):
             continue
-        flat = elements.nodes.ravel()
-        place = np.minimum(np.searchsorted(known, flat), max(len(known) - 1, 0))
-        there = (known[place] == flat if len(known) else np.zeros(len(flat), dtype=bool)) | (flat == 0)
-        there = there.reshape(elements.nodes.shape)
-        few = (elements.nodes != 0).sum(axis=1) < needed
-        gap = (elements.nodes[:, :needed] == 0).any(axis=1) | few
-        for row in np.flatnonzero(~there.all(axis=1) | gap)[:_MOST_ERRORS].tolist():
-            column = 0 if gap[row] else int(np.argmin(there[row]))
-            column = int(np.argmin(elements.nodes[row] != 0)) if gap[row] else column
-            found = (
-                f"element {elements.ids[row]} has no node there" if gap[row]
-                else f"element {elements.ids[row]} names node {elements.nodes[row, column]}, which is not there"
-            )  # fmt: skip
+        place = np.minimum(np.searchsorted(known, elements.nodes), max(len(known) - 1, 0))
+        there = (elements.nodes == 0) | (known[place] == elements.nodes if len(known) else False)
+        blank = elements.nodes == 0
+        blank[:, needed:] = False
+        if needed == 8:  # a ten-node tetrahedron has both of its last nodes
+            blank[:, 8] = (elements.nodes[:, 8] == 0) & (elements.nodes[:, 9] != 0)
+            blank[:, 9] = (elements.nodes[:, 9] == 0) & (elements.nodes[:, 8] != 0)
+        for row in np.flatnonzero((blank | ~there).any(axis=1))[:_MOST_ERRORS].tolist():
+            column = int(np.argmax(blank[row] | ~there[row]))
+            found = f"names node {elements.nodes[row, column]}, which is not there"
             reading.errors.append(
                 InputError(
-                    deck.files[elements.files[row]], found, line=int(elements.lines[row]), column=f"n{column + 1}",
-                    expected="the number of a node of the deck", mend="add the node, or correct the number",
+                    deck.files[elements.files[row]],
+                    f"element {elements.ids[row]} {'has no node there' if blank[row, column] else found}",
+                    line=int(elements.lines[row]),
+                    column=f"n{column + 1}",
+                    expected="the number of a node of the deck",
+                    mend="add the node, or correct the number",
                 )
-            )  # fmt: skip
+            )
