@@ -51,7 +51,7 @@ _FORMS = {
     "PART_INERTIA": f"({_PART} | xc:length yc:length zc:length tm:mass ircs nodeid | ixx ixy ixz iyy iyz izz "
     "| vtx:velocity vty:velocity vtz:velocity vrx:rate vry:rate vrz:rate)*",
     "SECTION_SOLID": "(secid:=section elform aet)*",
-    "SECTION_SHELL": "secid:=section elform shrf nip propt qr icomp setyp "
+    "SECTION_SHELL": "secid:=section elform shrf nip printout qr icomp shellset "
     "| t1:length t2:length t3:length t4:length nloc marea idof edgset",
     "HOURGLASS": "(hgid:=hourglass ihq qm ibq q1 q2 qb qw)*",
     "MAT_ELASTIC": f"{_BODY} e:pressure pr da db k",
