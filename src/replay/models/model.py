@@ -22,6 +22,9 @@ from replay.files import atomic_path
 SCHEMA = "replay-model"
 SCHEMA_VERSION = 1
 
+GRID_DECIMALS = 9
+"""Coordinates lie on a grid of a nanometre: any deck's columns hold them, and a rotation there and back finds them."""
+
 ROLES = (
     "brain",
     "csf",

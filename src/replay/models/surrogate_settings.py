@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
@@ -71,7 +71,7 @@ class OwnMaterial(Setting):
 
     law: str = Field(description="name of the law")
     density_kg_per_m3: Number = Field(gt=0, description="mass density")
-    parameters: dict[str, Any] = Field(default_factory=dict, description="constants of the law")
+    parameters: dict[str, Number | tuple[Number, ...]] = Field(default_factory=dict, description="constants of the law")
     source: str = Field(default="", description="where the numbers are from")
 
 

@@ -15,9 +15,11 @@ from replay.decks.keyword.units import SYSTEMS, Units, plausible_units
 from replay.documents import load_yaml
 from replay.errors import InputError, InputErrors
 from replay.models import Model, Part, census, surrogate
+from replay.models.model import GRID_DECIMALS
 from replay.models.surrogate import Surrogate, SurrogatePart
 from replay.models.surrogate_settings import HelmetSettings
 from replay.solver import LAWS, Material, law_parameters
+from replay.stages.own_deck import model_of_own_deck
 
 WEDGE = census.KINDS.index("wedge")
 
@@ -309,9 +311,12 @@ def as_model(source: ForeignDeck, numbers: dict[str, dict[int, int]], removed: n
         for name, pids in {**sets, "all_parts": tuple(mesh.parts[k].pid for k in kept)}.items()
     }
     node_sets = {f"facemask_mount_{n}": r for n, r in mesh.mounts.items()}
-    node_sets |= {f"strap_anchor_{n}": r for n, r in mesh.anchors.items()}
+    for place, rows in mesh.anchors.items():
+        node_sets[f"chin_cup_strap{place.removeprefix('cup')}" if place[:3] == "cup" else f"strap_anchor_{place}"] = (
+            rows
+        )
     return Model(
-        nodes=np.round(mesh.nodes[used], 12) + 0.0,
+        nodes=np.round(mesh.nodes[used], GRID_DECIMALS) + 0.0,
         node_ids=np.array([numbers["node"][v] for v in mesh.node_ids[used].tolist()], dtype=np.int64),
         hexes=row[hexes].astype(np.int32),
         element_ids=np.array([numbers["element"][v] for v in mesh.solid_ids[~removed].tolist()], dtype=np.int64),
@@ -377,13 +382,16 @@ def set_numbers(helmet: int) -> dict[str, int]:
 
 
 def read_deck_as_model(files: Sequence[Path], *, units: str | None = None, settings_file: Path | None = None) -> Model:
-    """A keyword deck as a model with its own numbers, for a run of it by itself.
+    """A keyword deck as a model with its own numbers, for a run of it by itself; one of ours as it was before.
 
     Raises
     ------
     InputError, InputErrors
         For what cannot be read, and for parts that cannot be simulated.
     """
+    ours = model_of_own_deck(read_keyword(*files)) if settings_file is None else None
+    if ours is not None:
+        return ours
     source = open_deck(files, units=units, settings_file=settings_file)
     same = {
         "node": {n: n for n in source.deck.node_ids.tolist()},

@@ -18,6 +18,7 @@ from replay.decks.lsdyna import material_lines
 from replay.files import sha256, write_json, write_text
 from replay.gates.helmet import CHECKS
 from replay.models import census
+from replay.models.model import GRID_DECIMALS
 from replay.models.readiness import surrogate_inspection
 from replay.models.surrogate import SurrogatePart
 from replay.stages.foreign_deck import WEDGE, ForeignDeck, as_model, open_deck, set_numbers
@@ -140,7 +141,15 @@ def _renumbered(source: ForeignDeck, base: int, helmet: int) -> Renumbered:
     }
     title = f"helmet {helmet}, prepared from {', '.join(f.name for f in deck.files)}"
     return renumbered(
-        deck, source.units, base, solids=deck.solids, parts=numbers, sets=sets, own_materials=own, title=title
+        deck,
+        source.units,
+        base,
+        points_m=np.round(source.helmet.nodes, GRID_DECIMALS) + 0.0,
+        solids=deck.solids,
+        parts=numbers,
+        sets=sets,
+        own_materials=own,
+        title=title,
     )
 
 

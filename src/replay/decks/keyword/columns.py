@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from replay.decks.keyword.entries import Entry
 from replay.decks.keyword.fields import Value
+
+FACTS_MARK = "$replay "
+"""Begins a comment line that holds facts of a deck of ours."""
+FACTS_SCHEMA = "replay-deck-facts 1"
 
 
 def field_names(*names: str) -> str:
@@ -94,6 +100,15 @@ def entry_lines(entry: Entry) -> list[str]:
         else:
             lines.append("".join(_field(v, f.width) for f, v in zip(row.fields, row.values)).rstrip())
     return lines
+
+
+def facts_lines(facts: Mapping[str, Any]) -> list[str]:
+    """Comment lines for facts: 80 columns each, ASCII."""
+    text = json.dumps({"schema": FACTS_SCHEMA, **facts}, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    room = 80 - len(FACTS_MARK)
+    # A space at the end of a line would not survive an editor: it is written as its escape, which JSON permits.
+    text = text.replace(" ", "\\u0020")
+    return [FACTS_MARK + text[k : k + room] for k in range(0, len(text), room)]
 
 
 def joined(lines: Iterable[str]) -> str:

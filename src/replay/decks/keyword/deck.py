@@ -134,6 +134,8 @@ class KeywordDeck:
         Everything that a run does not use, with its place and meaning.
     collisions
         Numbers given twice.
+    facts
+        Text of the comment lines that decks of ours carry; see `replay.decks.facts`.
     keywords
         How many keywords the files hold; each is in the meshes, the entries, `kept` or `spent`.
     spent
@@ -151,6 +153,7 @@ class KeywordDeck:
     kept: list[Kept] = field(default_factory=list)
     remarks: list[Remark] = field(default_factory=list)
     collisions: list[Collision] = field(default_factory=list)
+    facts: str = ""
     keywords: int = 0
     spent: int = 0
 

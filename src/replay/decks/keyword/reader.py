@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from replay.decks.keyword.blocks import STANDARD, Block, read_blocks
+from replay.decks.keyword.columns import FACTS_MARK
 from replay.decks.keyword.deck import Collision, Elements, Kept, KeywordDeck, Remark, meaning_of
 from replay.decks.keyword.entries import read_entries
 from replay.decks.keyword.fields import Line, Value, mistake
@@ -92,6 +93,7 @@ def _take(block: Block, index: int, reading: _Reading, above: tuple[Path, ...], 
         if keyword == "TITLE":
             deck.title = deck.title or " ".join(line.text.strip() for line in block.lines)
         else:
+            deck.facts += "".join(row[len(FACTS_MARK) :].strip() for row in block.raw if row.startswith(FACTS_MARK))
             _remark_lines(block, deck)
     elif keyword == "NODE":
         reading.nodes.append((transform.nodes(read_nodes(block, reading.parameters)), index))

@@ -94,6 +94,7 @@ def renumbered(
     units: Units,
     base: int,
     *,
+    points_m: np.ndarray,
     solids: Elements,
     parts: Mapping[int, int],
     sets: Mapping[int, int],
@@ -110,6 +111,8 @@ def renumbered(
         Of the deck.
     base
         Numbers begin above it: 10,000,000 or 20,000,000.
+    points_m
+        Where the deck's nodes are to be, (n, 3) [m].
     solids
         Those that stay.
     parts
@@ -144,7 +147,7 @@ def renumbered(
 
     row = {old: k for k, old in enumerate(deck.node_ids.tolist())}
     old_nodes = list(numbers.of["node"])
-    points = np.round(deck.nodes[[row[n] for n in old_nodes]] * units.length_m, 12) + 0.0
+    points = points_m[[row[n] for n in old_nodes]]
     lines = [f"$ {title}", "$ units: m, kg, s, N, Pa, J (SI)"]
     for kind in _ORDER:
         for entry in chosen:
