@@ -36,7 +36,8 @@ def surrogate_inspection(
     volumes = hex_volumes(helmet.nodes, hexes)
     whole = kinds == 0
     quality = scaled_jacobians(helmet.nodes, hexes[whole])
-    aspect = aspect_ratios(helmet.nodes, hexes[whole]) if whole.any() else np.zeros(0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # two nodes at one place: the ratio is infinite
+        aspect = aspect_ratios(helmet.nodes, hexes[whole])
     skin, folded = census.skin_edges(hexes) if len(hexes) else (0, 0)
     tolerance = _COINCIDENT * census.shortest_edge(helmet.nodes, hexes)
     double = census.duplicate_nodes(helmet.nodes, tolerance) if tolerance > 0 else np.zeros((0, 2), dtype=int)

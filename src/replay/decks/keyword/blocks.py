@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from replay.decks.keyword.fields import Line, shown
+from replay.decks.keyword.fields import Line, mistake, shown
 from replay.errors import InputError
 
 LONGEST_LINE = 4096
@@ -48,8 +48,19 @@ class Block:
 
     @cached_property
     def lines(self) -> list[Line]:
-        """Lines that hold data: no comments, nothing blank at the end; a blank one between is a card of defaults."""
+        """Lines that hold data: no comments, nothing blank at the end; a blank one between is a card of defaults.
+
+        Raises
+        ------
+        InputError
+            For a tab: nobody knows how many columns it stands for.
+        """
         kept = [Line(self.file, self.number + k, text) for k, text in enumerate(self.raw, 1) if text[:1] != "$"]
+        tabbed = next((line for line in kept if "\t" in line.text), None)
+        if tabbed is not None:
+            raise mistake(
+                tabbed, "line", "a tab stands in it", "blanks: the format counts columns", "replace tabs by blanks"
+            )
         while kept and not kept[-1].text.strip():
             kept.pop()
         return kept

@@ -12,7 +12,7 @@ from replay.errors import InputError
 
 # A FORTRAN real: the exponent's letter may be missing (1.0-3), or be D.
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[eEdD]?([+-][0-9]+)|[eEdD]([0-9]+))?")
-_LARGEST = 10**18
+_MOST_DIGITS = 15  # a double holds every whole number of so many
 
 Value = float | int | str | None
 
@@ -60,10 +60,10 @@ def to_float(text: str) -> float | None:
 
 def to_int(text: str) -> int | None:
     """Whole number of a field (``7`` or ``7.0``), or None where it is none."""
+    if text.isdecimal() and text.isascii() and len(text) <= _MOST_DIGITS:
+        return int(text)
     value = to_float(text)
-    if value is None or value != int(value) or abs(value) > _LARGEST:
-        return None
-    return int(text) if text.lstrip("+-").isdecimal() and text.isascii() else int(value)
+    return int(value) if value is not None and value == int(value) and abs(value) < 10**_MOST_DIGITS else None
 
 
 def split(text: str, widths: Sequence[int]) -> list[str]:

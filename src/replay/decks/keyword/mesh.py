@@ -80,7 +80,7 @@ def read_elements(block: Block, parameters: Mapping[str, Value], *, shell: bool)
     number = {LONG: 20, I10: 10}.get(block.layout, 8)
     lines = _filled(block)
     two = not shell and bool(lines) and _is_first_of_two(lines[0].text, number)
-    if two and len(lines) % 2 == 0:
+    if two and len(lines) % 2 == 0 and all(_is_first_of_two(line.text, number) for line in lines[::2]):
         heads, tails = _columns(lines[::2], (number,) * 2), _columns(lines[1::2], (number,) * 10)
         quick = None if heads is None or tails is None else [*heads, *tails]
     else:
