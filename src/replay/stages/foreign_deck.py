@@ -53,7 +53,9 @@ class ForeignDeck:
     helmet: Surrogate
 
 
-def open_deck(files: Sequence[Path], *, units: str | None = None, settings_file: Path | None = None) -> ForeignDeck:
+def open_deck(
+    files: Sequence[Path], *, units: str | None = None, settings_file: Path | None = None, otherwise: str | None = None
+) -> ForeignDeck:
     """Read keyword files as one deck.
 
     Parameters
@@ -64,6 +66,8 @@ def open_deck(files: Sequence[Path], *, units: str | None = None, settings_file:
         Name of the unit system; what the settings say, or else what the deck's numbers say, where None.
     settings_file
         ``helmet.yaml``.
+    otherwise
+        Units of a deck whose numbers do not say them; None refuses it.
 
     Raises
     ------
@@ -75,14 +79,16 @@ def open_deck(files: Sequence[Path], *, units: str | None = None, settings_file:
     if not len(deck.solids.ids) and not len(deck.shells.ids):
         raise InputError(files[0], "the deck has no solid and no shell", expected="*ELEMENT_SOLID", line=1,
                          column="ELEMENT_SOLID", mend="name the files with the mesh")  # fmt: skip
-    system, said = _units(files[0], deck, units, settings)
+    system, said = _units(files[0], deck, units, settings, otherwise)
     materials = {mid: map_material(entry, deck, system) for mid, entry in deck.of_kind("material").items()}
     _put_own_materials(settings, settings_file, materials)
     helmet = _surrogate(deck, system, settings, settings_file, materials)
     return ForeignDeck(deck, system, said, settings, settings_file, materials, helmet)
 
 
-def _units(file: Path, deck: KeywordDeck, asked: str | None, settings: HelmetSettings) -> tuple[Units, str]:
+def _units(
+    file: Path, deck: KeywordDeck, asked: str | None, settings: HelmetSettings, otherwise: str | None
+) -> tuple[Units, str]:
     if asked or settings.units:
         return SYSTEMS[str(asked or settings.units)], "the command line" if asked else "the settings"
     used = np.isin(deck.node_ids, np.concatenate([deck.solids.nodes.ravel(), deck.shells.nodes.ravel()]))
@@ -91,6 +97,8 @@ def _units(file: Path, deck: KeywordDeck, asked: str | None, settings: HelmetSet
     fit = plausible_units([d for d in densities if d > 0], extent)
     if len(fit) == 1:
         return fit[0], f"its numbers: densities and a size of {extent * fit[0].length_m:.3g} m fit no other system"
+    if otherwise:
+        return SYSTEMS[otherwise], "nobody: assumed"
     why = "several systems fit" if fit else "no system makes a helmet of it"
     shown = f"{why}: {', '.join(u.name for u in fit)}" if fit else why
     raise InputError(
