@@ -210,7 +210,9 @@ def outcome(path: Path) -> str:
                 assert error.expected, error
             return "refused"
         blocks = [block for file in deck.files for block in read_blocks(file)]
-        nodes = sum(bool(line.text.strip()) for b in blocks if b.keyword == "NODE" for line in b.lines)
+        nodes = sum(
+            bool(line.text.strip()) for b in blocks if b.keyword == "NODE" and not b.options for line in b.lines
+        )
         assert nodes == len(deck.node_ids) + sum(c.kind == "node" for c in deck.collisions)
         meshes = sum(b.keyword in ("NODE", "ELEMENT_SOLID", "ELEMENT_SHELL") and not b.options for b in blocks)
         headings = {(entry.file, entry.line) for entry in deck.entries}
@@ -228,7 +230,7 @@ def bases(folder: Path) -> list[str]:
     """Texts to damage: the real decks, small ones more often, and the rich one."""
     texts = {p.name: p.read_text(encoding="latin-1") for p in sorted(folder.glob("*.k"))}
     small = [t for t in texts.values() if len(t) < 100_000]
-    return [*texts.values(), *small * 4, *[RICH] * 12]
+    return [*texts.values(), *small * 16, *[RICH] * 80]
 
 
 def run(folder: Path, count: int, seed: int) -> Counter[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
 from tests.decks.mutation import INNER, RICH, mutated, outcome, run
 
 # Derandomised: a suite that fails only now and then helps nobody; `tests.decks.mutation` runs other seeds.

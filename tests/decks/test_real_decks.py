@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.decks.plain_keyword import hex_volume, quad_area, read_mesh
 
 from replay.decks.keyword import KeywordDeck, read_keyword
 from replay.stages.foreign_deck import open_deck
+from tests.decks.plain_keyword import hex_volume, quad_area, read_mesh
 
 # Nodes, solids, shells, distinct keywords as `ansys-dyna-core` 0.12.1 and `lsdyna-mesh-reader` 0.2.1 count them.
 COUNTS = {

@@ -295,6 +295,19 @@ def test_all_mistakes_of_the_settings_come_at_once(tmp_path: Path, helmet: Model
     assert [error.line for error in caught.value.errors] == [1, 2, 3, 4]
 
 
+def test_the_settings_of_the_page_are_settings(repository: Path, tmp_path: Path) -> None:
+    import re
+
+    from replay.documents import load_yaml
+    from replay.models.surrogate_settings import HelmetSettings
+
+    (example,) = re.findall(r"```yaml\n(.*?)```", (repository / "docs" / "decks.md").read_text(), flags=re.DOTALL)
+    (tmp_path / "helmet.yaml").write_text(example)
+    settings = load_yaml(tmp_path / "helmet.yaml", HelmetSettings)
+    assert settings.materials[7].parameters["youngs_modulus_pa"] == 3.356e9
+    assert settings.padding.set1 == (174, 175)
+
+
 def own_deck(model: Model) -> DeckInput:
     from scipy.spatial.transform import Rotation
 

@@ -95,7 +95,7 @@ def _take(block: Block, index: int, reading: _Reading, above: tuple[Path, ...], 
         else:
             deck.facts += "".join(row[len(FACTS_MARK) :].strip() for row in block.raw if row.startswith(FACTS_MARK))
             _remark_lines(block, deck)
-    elif keyword == "NODE":
+    elif keyword == "NODE" and not block.options:
         reading.nodes.append((transform.nodes(read_nodes(block, reading.parameters)), index))
         _remark_beyond(block, deck, (8, 16, 16, 16, 8, 8), (20,) * 6, (10, 16, 16, 16, 10, 10))
     elif keyword in _SOLIDS + _SHELLS and not block.options:
