@@ -64,6 +64,8 @@ def read_nodes(block: Block, parameters: Mapping[str, Value]) -> NodeRows:
         ids[row] = _identity(line, "nid", fields[0], parameters)
         for k in range(1, 6):
             table[row, k] = _number(line, names[k], fields[k], parameters)
+            if k > 3 and (table[row, k] % 1 or abs(table[row, k]) > 1000):
+                raise mistake(line, names[k], f"{shown(fields[k])} is no constraint code", "a whole number, 0 to 7")
     return NodeRows(ids, table[:, 1:4].copy(), table[:, 4:].astype(np.int64), _numbers(lines))
 
 
