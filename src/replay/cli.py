@@ -34,6 +34,7 @@ _STAGES: dict[str, tuple[str, str]] = {
 }
 _ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
 _PULSES = ("sine_squared", "half_sine", "triangle", "skewed", "double")
+_UNITS = ("m-kg-s", "mm-tonne-s", "mm-kg-ms", "mm-g-ms", "cm-g-us", "cm-g-s", "in-lbf-s")
 _SOLVING = ("shake", "impact", "sensitivity")
 
 
@@ -140,6 +141,24 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
     solve.add_argument("--anew", action="store_true", help="start from time 0 even where a checkpoint lies")
 
+    helmet = commands.add_parser("helmet", help="a helmet from LS-DYNA keyword files: look at it, make it ready")
+    actions = helmet.add_subparsers(dest="action", required=True, metavar="inspect | prepare")
+    for action, text in (
+        ("inspect", "census, quality, mass, datum and interfaces of a deck; the helmet gate"),
+        ("prepare", "remove wedges, renumber, convert to SI; write model, include file and manifest"),
+    ):
+        command = actions.add_parser(action, help=text, description=text)
+        command.add_argument("files", type=Path, nargs="+", metavar="FILE.k", help="read as one deck")
+        command.add_argument(
+            "--units", choices=_UNITS, help="length-mass-time of the deck (default: found, or refused)"
+        )
+        command.add_argument("--settings", type=Path, metavar="HELMET.yaml", help="datum, mounts, roles, materials")
+        if action == "inspect":
+            command.add_argument("--json", type=Path, metavar="FILE.json", help="also write the report")
+        else:
+            command.add_argument("--as", dest="helmet", type=int, choices=[1, 2], required=True, help="helmet 1 or 2")
+            command.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
     commands.add_parser("doctor", help="check this machine and environment")
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
     schema.add_argument("--out", type=Path, help="write it to a file instead")
@@ -241,6 +260,15 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _run_helmet(arguments: argparse.Namespace) -> int:
+    from replay.stages import helmet
+
+    given = {"units": arguments.units, "settings_file": arguments.settings}
+    if arguments.action == "inspect":
+        return helmet.inspect(arguments.files, out=arguments.json, **given)
+    return helmet.prepare(arguments.files, helmet=arguments.helmet, out=arguments.out, **given)
+
+
 def _run_tool(arguments: argparse.Namespace) -> int:
     from replay.stages import explicit, tools
 
@@ -269,6 +297,7 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             threads=arguments.threads,
             anew=arguments.anew,
         ),
+        "helmet": lambda: _run_helmet(arguments),
         "schema": lambda: tools.write_schema(arguments.out),
     }
     return call[arguments.command]()

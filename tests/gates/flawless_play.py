@@ -34,6 +34,8 @@ GOOD: dict[str, dict[str, Any]] = {
         "wedge_share": 0.0,
         "removed_not_wedge": 0,
         "missing_interfaces": 0,
+        "unusable_parts": 0,
+        "colliding_ids": 0,
         "min_volume_m3": 1e-8,
         "min_scaled_jacobian": 0.35,
     },

@@ -96,7 +96,7 @@ def test_head_and_helmet_have_their_stated_mass_and_the_origin_is_the_heads_cg(m
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     assert head.mass_kg == pytest.approx(4.90, rel=1e-12)
     assert helmet.mass_kg == pytest.approx(1.83, rel=1e-12)
-    np.testing.assert_allclose(head.cg_m, 0, atol=1e-12)
+    np.testing.assert_allclose(head.cg_m, 0, atol=0.51e-9)  # nodes lie on a grid of a nanometre
     for name, mass in (("brain", 1.19), ("csf", 0.27), ("skull", 1.28), ("scalp", 2.16)):
         assert assembly_mass(model, name=name).mass_kg == pytest.approx(mass, rel=1e-12)
 
