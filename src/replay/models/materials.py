@@ -28,6 +28,26 @@ def load_materials() -> dict[str, dict[str, Any]]:
     return load_data("materials.yaml")
 
 
+def brain_material(name: str) -> dict[str, Any]:
+    """One of the parameter sets of the brain's law ``brain_isv``, in the form of `load_materials`.
+
+    Parameters
+    ----------
+    name
+        Name of the set in ``data/brain.yaml``.
+    """
+    data = load_data("brain.yaml")
+    chosen, density = data["sets"][name], data["density_kg_per_m3"]
+    certainty = {key: facts["certainty"] for key, facts in data["parameters"].items()}
+    return {
+        "law": "brain_isv",
+        "density_kg_per_m3": density["value"],
+        "parameters": dict(chosen["values"]),
+        "certainty": {"density_kg_per_m3": density["certainty"], **certainty},
+        "source": chosen["source"],
+    }
+
+
 def wave_speed_m_per_s(material: Mapping[str, Any]) -> float:
     """Speed of a plane pressure wave at small strain [m/s].
 
