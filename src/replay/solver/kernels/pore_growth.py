@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from replay.solver.kernels.device import device
+from replay.solver.kernels.device import compiled, device
 from replay.solver.kernels.mathx import exp, expm1, log1p, sinh
 from replay.solver.kernels.tensors import add_trace, contract, trace
 
@@ -62,3 +62,14 @@ def grow_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensitivi
     opened = power * (1.0 - w) * sheared / (1.0 - phi)
     w = min(w * pulled + opened, 1.0 - _SOLID)
     return w, max(-expm1(log1p(-w) / power), phi)
+
+
+def _advance_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensitivity, cap):
+    """Advance `grow_pores` for many points in place: w, phi (m,), stress, strain (m, 6), plastic_strain (m,)."""
+    for k in range(w.shape[0]):
+        s = (stress[k, 0], stress[k, 1], stress[k, 2], stress[k, 3], stress[k, 4], stress[k, 5])
+        e = (strain[k, 0], strain[k, 1], strain[k, 2], strain[k, 3], strain[k, 4], strain[k, 5])
+        w[k], phi[k] = grow_pores(w[k], phi[k], s, e, plastic_strain[k], exponent, shear_sensitivity, cap)
+
+
+advance_pores = compiled(_advance_pores)
