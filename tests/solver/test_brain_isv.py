@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 from dumb_brain import DumbBrain, dev, random_path
+from material_point import PARAMETERS, Point
 from numba.core import config
 from scipy.spatial.transform import Rotation
-from material_point import PARAMETERS, Point
 from test_plain_python import CHILD, march
 
 from replay.solver import Material, Problem, SolverPart
