@@ -158,6 +158,27 @@ def _parser() -> argparse.ArgumentParser:
         else:
             command.add_argument("--as", dest="helmet", type=int, choices=[1, 2], required=True, help="helmet 1 or 2")
             command.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+    material = commands.add_parser("material", help="put one material through one test; table and picture")
+    material.add_argument("name", help="a material of the model, or brain:<set>")
+    material.add_argument(
+        "--mode", default="compression", help="compression, tension, simple_shear, confined, cyclic, relaxation"
+    )
+    material.add_argument("--rate", type=float, default=30.0, metavar="PER_S", help="nominal strain rate")
+    material.add_argument("--strain", type=float, default=0.3, help="largest nominal strain, positive")
+    material.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
+    calibrate = commands.add_parser("calibrate", help="fit the brain's law to tests; report with identifiability")
+    calibrate.add_argument("data", type=Path, metavar="DATA.csv", help="docs/file-formats.md says what it holds")
+    calibrate.add_argument("--modes", default="compression", choices=["compression", "simple_shear", "all"])
+    calibrate.add_argument("--hold", nargs="*", default=[], metavar="PARAMETER", help="parameters that are not fitted")
+    calibrate.add_argument("--starts", type=_positive, default=8, help="first guesses")
+    calibrate.add_argument("--seed", type=int, default=1, help="of the random first guesses")
+    calibrate.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
+    figures = commands.add_parser("tissue-figures", help="the article's Figures 1 to 4 from the shipped parameters")
+    figures.add_argument("--data", type=Path, metavar="DATA.csv", help="tests to show (default: the shipped ones)")
+    figures.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
+    figures.add_argument("--out", type=Path, required=True, metavar="FOLDER")
 
     commands.add_parser("doctor", help="check this machine and environment")
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
@@ -270,7 +291,7 @@ def _run_helmet(arguments: argparse.Namespace) -> int:
 
 
 def _run_tool(arguments: argparse.Namespace) -> int:
-    from replay.stages import explicit, tools
+    from replay.stages import explicit, laboratory, tools
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
@@ -298,6 +319,20 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             anew=arguments.anew,
         ),
         "helmet": lambda: _run_helmet(arguments),
+        "material": lambda: laboratory.run_material(
+            arguments.name, arguments.mode, arguments.rate, arguments.strain, arguments.out
+        ),
+        "calibrate": lambda: laboratory.run_calibration(
+            arguments.data,
+            arguments.out,
+            modes=arguments.modes,
+            hold=arguments.hold,
+            starts=arguments.starts,
+            seed=arguments.seed,
+        ),
+        "tissue-figures": lambda: laboratory.run_article_figures(
+            arguments.out, arguments.data, threads=arguments.threads
+        ),
         "schema": lambda: tools.write_schema(arguments.out),
     }
     return call[arguments.command]()

@@ -318,6 +318,10 @@ class ModelChoice(Setting):
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
     resolution: Literal["tiny", "coarse"] = Field(default="coarse", description="Mesh resolution.")
+    brain_material: Literal["brain_isv", "viscohyperelastic"] = Field(
+        default="brain_isv",
+        description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
+    )
     helmet_structure: Literal["rigid", "deformable"] = Field(
         default="rigid",
         description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "

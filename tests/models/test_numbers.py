@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from replay.models.build import PID_BLOCKS
 from replay.models.cubed_sphere import HEX_CORNERS, cube_lattice
 from replay.models.inspection import helmet_datum, mass_report, missing_interfaces, unconnected_parts
 from replay.models.mass import mass_properties, three_point_datum
-from replay.models.materials import CERTAINTIES, load_materials, wave_speed_m_per_s
+from replay.models.materials import CERTAINTIES, brain_parameters, load_materials, wave_speed_m_per_s
 from replay.models.ogrid import Resolution, head_mesh
 from replay.models.quality import (
     aspect_ratios,
@@ -212,6 +214,13 @@ def test_every_material_number_has_unit_certainty_and_source() -> None:
         assert set(material["certainty"]) == set(material["parameters"]) | {"density_kg_per_m3"}, name
         assert set(material["certainty"].values()) <= set(CERTAINTIES), name
         for parameter in material["parameters"]:
+            if name == "brain":  # its units stand in brain.yaml, beside symbol and bounds
+                facts = brain_parameters()[parameter]
+                assert {"Pa": "_pa", "1/s": "_per_s"}.get(facts["unit"], "") == (
+                    re.findall("_pa$|_per_s$", parameter) or [""]
+                )[0], parameter
+                assert facts["meaning"], parameter
+                continue
             assert parameter.endswith(
                 ("_pa", "_s", "_ratio", "_ratios", "_strain", "_factor", "_per_s", "_coefficient")
             )

@@ -291,6 +291,14 @@ def material_lines(part: DeckPart) -> list[str]:
         short, long, rate = one_decay(float(p["shear_modulus_pa"]), ratios, times)
         head = field_names("mid", "ro", "bulk", "g0", "gi", "beta")
         return ["*MAT_VISCOELASTIC", head, card(mid, density, p["bulk_modulus_pa"], short, long, rate)]
+    if part.law == "brain_isv":
+        # no keyword has this law: its Maxwell element at small strain, beside the network's modulus
+        flow, share = float(p["reference_rate_per_s"]) / float(p["yield_stress_pa"]), float(p["locking_stretch"]) ** -2
+        short, network = float(p["shear_modulus_pa"]), float(p["network_modulus_pa"]) * (3 - share) / (1 - share) / 3
+        head = field_names("mid", "ro", "bulk", "g0", "gi", "beta")
+        note = f"$ {part.name}: stands for the law brain_isv, linearised at rest; no damage"
+        values = (p["bulk_modulus_pa"], short + network, network, short * flow)
+        return [note, "*MAT_VISCOELASTIC", head, card(mid, density, *values)]
     if part.law == "crushable_foam":
         strain, stress = foam_curve(p)
         tension = float(p.get("tension_cutoff_pa", p["plateau_stress_pa"]))

@@ -53,6 +53,7 @@ def build_model(
     *,
     helmet: bool = True,
     helmet_structure: str = "rigid",
+    brain: str = "brain_isv",
 ) -> Model:
     """Build head and helmet.
 
@@ -68,6 +69,8 @@ def build_model(
         False for a bare head.
     helmet_structure
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
+    brain
+        Law of the brain: ``brain_isv`` or ``viscohyperelastic``.
 
     Returns
     -------
@@ -101,7 +104,7 @@ def build_model(
     regions = np.zeros(len(hexes), dtype=np.int32)
     in_brain = element_part == index["brain"]
     regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
-    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target)
+    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target, brain)
     if helmet_structure == "rigid":
         for part in parts:
             if part.role in STRUCTURE_ROLES:
@@ -180,6 +183,7 @@ def _calibrated(
     parts: tuple[Part, ...],
     head: HeadPreset,
     helmet_mass_kg: float,
+    brain: str,
 ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, float]]]:
     """Densities that give every head part its mass and the helmet its own; the state before and after.
 
@@ -188,7 +192,7 @@ def _calibrated(
     and paint that are not meshed.
     """
     volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
-    library = load_materials()
+    library = load_materials(brain)
     nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
     before = volume * nominal
     of_helmet = np.array([p.assembly == "helmet" for p in parts])

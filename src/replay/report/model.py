@@ -107,6 +107,8 @@ class ReportInput:
         brain_histories.csv.
     convergence_class
         ``A``, ``B``, ``C`` or ``unknown``: shown beside every strain.
+    damage, damage_sensitivity
+        damage_volume.csv, damage_sensitivity.csv; None where the brain's law has no damage variable.
     action
         action.csv.
     crossover_s
@@ -148,6 +150,8 @@ class ReportInput:
     head_measures: Sequence[Row] = ()
     brain_histories: pd.DataFrame | None = None
     convergence_class: str = "unknown"
+    damage: pd.DataFrame | None = None
+    damage_sensitivity: pd.DataFrame | None = None
     action: pd.DataFrame | None = None
     crossover_s: float | None = None
     parts: Sequence[Row] = ()

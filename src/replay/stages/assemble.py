@@ -21,6 +21,7 @@ def run(workspace: Workspace) -> str | None:
         play.model.resolution,
         helmet_mass_kg=play.helmet.mass_kg,
         helmet_structure=play.model.helmet_structure,
+        brain=play.model.brain_material,
     )
     print(models.summary_text(model))
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
