@@ -13,6 +13,7 @@ from replay.motion.focal import clip_focal, frame_focal
 from replay.motion.pose import Poses, Prior, choose, mirrored, refine, residuals
 from replay.motion.settings import CameraSettings
 from replay.motion.synthetic import LANDMARKS
+from replay.motion.tracks import Tracks
 
 POINTS = np.array(list(LANDMARKS.values()))
 BENT = Lens((640.0, 360.0), (-0.27, -0.04, 0.002, -0.0003, 0.24))
@@ -106,6 +107,24 @@ def test_one_wild_click_does_not_move_the_pose():
     robust = refine(POINTS, pixels, truth, lens, sigma_px=1.0)
     plain = refine(POINTS, pixels, truth, lens, sigma_px=1.0, loss="linear")
     assert _turned(robust, truth)[0] < 0.1 * _turned(plain, truth)[0]
+
+
+def test_a_click_of_small_weight_counts_as_one_of_large_sigma():
+    lens, truth = Lens((960.0, 540.0)), _poses(1, 2.0, 2400.0)
+    pixels, _ = project(POINTS, truth.rotation, truth.shift, truth.log_f, lens)
+    pixels[0, 4] += 3.0
+    weight = np.ones(pixels.shape[:2])
+    weight[0, 4] = 0.01
+    tracks = Tracks(np.arange(1), pixels, weight)
+    assert tracks.sigma_px(2.0)[0, 4] == pytest.approx(20.0)
+    turned = [
+        _turned(refine(POINTS, pixels, truth, lens, sigma_px=sigma, loss="linear"), truth)[0]
+        for sigma in (1.0, tracks.sigma_px(1.0))
+    ]
+    assert turned[1] < 0.03 * turned[0]
+    # a weight of one is the same number to the last bit
+    same = [refine(POINTS, pixels, truth, lens, sigma_px=s).shift for s in (1.3, np.full((1, len(POINTS)), 1.3))]
+    assert (same[0] == same[1]).all()
 
 
 def test_mirrored_twin_projects_a_flat_template_to_the_same_pixels_from_afar():

@@ -171,7 +171,7 @@ def test_click_noise_is_measured_where_there_are_degrees_of_freedom(repository):
     folder = repository / "config" / "plays" / "demo"
     camera, template = load_camera(folder / "Config.json"), read_template(folder / "helmet_landmarks.csv")
     tracks = read_clicks(folder / "kinovea_clicks.csv", template, camera.size)
-    sigma, measured = click_noise(reconstruct_clicks(tracks, template, camera), camera, tracks.seen)
+    sigma, measured = click_noise(reconstruct_clicks(tracks, template, camera), camera, tracks)
     assert measured
     assert sigma == pytest.approx(1.0, rel=0.15)
 

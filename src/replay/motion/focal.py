@@ -56,7 +56,7 @@ def clip_focal(
     lens: Lens,
     camera: CameraSettings,
     *,
-    sigma_px: float,
+    sigma_px: float | np.ndarray,
     loss: Loss = "student",
 ) -> ClipFocal:
     """One focal length for all frames: the cost of the best poses, minimised over log f.
@@ -143,7 +143,7 @@ def frame_focal(
     lens: Lens,
     prior: Prior,
     *,
-    sigma_px: float,
+    sigma_px: float | np.ndarray,
     loss: Loss = "student",
 ) -> tuple[Poses, np.ndarray, np.ndarray]:
     """Pose and focal length of each frame.

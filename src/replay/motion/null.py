@@ -43,15 +43,16 @@ class NullPeaks:
     replicates: int
 
 
-def click_noise(motion: ProtocolMotion, camera: CameraSettings, seen: np.ndarray) -> tuple[float, bool]:
-    """Standard deviation of a click coordinate [px], and whether the residuals told it.
+def click_noise(motion: ProtocolMotion, camera: CameraSettings, tracks: Tracks) -> tuple[float, bool]:
+    """Standard deviation of a click coordinate of weight 1 [px], and whether the residuals told it.
 
     The median squared residual of a two-dimensional Gaussian is 2 ln 2 sigma^2; outliers do not move it.
     """
+    seen, weight = tracks.seen[motion.used], tracks.weight[motion.used]
     freedom = 2.0 * seen.sum() - 6.0 * len(seen)
     if freedom < 20.0:
         return camera.click_sigma_px, False
-    squared = np.sum(motion.errors_px**2, axis=2)[seen]
+    squared = (weight * np.sum(motion.errors_px**2, axis=2))[seen]
     spread = float(np.median(squared)) / (2.0 * np.log(2.0))
     return float(np.sqrt(spread * 2.0 * seen.sum() / freedom)), True
 
@@ -88,14 +89,15 @@ def null_peaks(
     rotation = np.repeat(motion.poses.rotation[np.flatnonzero(pre)[-1:]], used.sum(), axis=0)
     exact, _ = project(template.points_m, rotation, shift, motion.poses.log_f, lens_of(camera))
     seen = tracks.seen[used]
-    sigma, _ = click_noise(motion, camera, seen)
+    sigma, _ = click_noise(motion, camera, tracks)
+    spread_px = tracks.sigma_px(sigma)[used][..., None]
 
     rng = np.random.default_rng(_SEED)
     peaks, noise = [], []
     for _ in range(replicates):
         pixels = np.full_like(tracks.pixels, np.nan)
-        pixels[used] = np.where(seen[..., None], exact + rng.normal(0.0, sigma, exact.shape), np.nan)
-        quiet = reconstruct_clicks(Tracks(tracks.frames, pixels), template, camera, clip=motion.clip)
+        pixels[used] = np.where(seen[..., None], exact + rng.normal(0.0, spread_px, exact.shape), np.nan)
+        quiet = reconstruct_clicks(Tracks(tracks.frames, pixels, tracks.weight), template, camera, clip=motion.clip)
         k = quiet.kinematics
         along, across = along_ray(k)
         inner = slice(1, -1)

@@ -78,7 +78,7 @@ def refine(
     start: Poses,
     lens: Lens,
     *,
-    sigma_px: float,
+    sigma_px: float | np.ndarray,
     free_focal: bool = False,
     prior: Prior | None = None,
     loss: Loss = "student",
@@ -97,7 +97,7 @@ def refine(
     lens
         Principal point and distortion.
     sigma_px
-        Standard deviation of a click coordinate.
+        Standard deviation of a click coordinate, one for all or ``(k, n)``.
     free_focal
         Whether log f is unknown.
     prior
@@ -111,14 +111,15 @@ def refine(
     size = 7 if free_focal else 6
     seen = np.isfinite(pixels[..., 0])
     clicks = np.where(seen[..., None], pixels, 0.0)
+    spread = np.broadcast_to(np.asarray(sigma_px, dtype=float), seen.shape)[..., None]
     rotation, shift, log_f = start.rotation.copy(), start.shift.copy(), start.log_f.copy()
 
     def evaluate(rotation: np.ndarray, shift: np.ndarray, log_f: np.ndarray, rows: np.ndarray) -> tuple:
         predicted, jacobian = project(points, rotation, shift, log_f, lens)
         mask = seen[rows]
         valid = np.isfinite(predicted[..., 0]) | ~mask
-        error = np.where(mask[..., None], clicks[rows] - np.nan_to_num(predicted), 0.0) / sigma_px
-        jacobian = np.where(mask[..., None, None], np.nan_to_num(jacobian), 0.0)[..., :size] / sigma_px
+        error = np.where(mask[..., None], clicks[rows] - np.nan_to_num(predicted), 0.0) / spread[rows]
+        jacobian = np.where(mask[..., None, None], np.nan_to_num(jacobian), 0.0)[..., :size] / spread[rows, ..., None]
         r2 = np.einsum("kna,kna->kn", error, error)
         if loss == "student":
             cost = np.where(mask, (_FREEDOM + 2.0) * np.log1p(r2 / _FREEDOM), 0.0).sum(axis=1)
@@ -270,7 +271,7 @@ def choose(
     log_f: np.ndarray,
     lens: Lens,
     *,
-    sigma_px: float,
+    sigma_px: float | np.ndarray,
     loss: Loss = "student",
 ) -> Choice:
     """Best pose of each frame at a given focal length, from several starts.

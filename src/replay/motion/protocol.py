@@ -108,9 +108,9 @@ def reconstruct_clicks(
     clip
         Focal length of the clip where it is known already (null simulations); estimated otherwise.
     """
-    lens, sigma, points = lens_of(camera), camera.click_sigma_px, template.points_m
+    lens, points = lens_of(camera), template.points_m
     used = tracks.seen.sum(axis=1) >= 3
-    pixels = tracks.pixels[used]
+    pixels, sigma = tracks.pixels[used], tracks.sigma_px(camera.click_sigma_px)[used]
 
     count = len(pixels)
     if clip is None:

@@ -135,7 +135,7 @@ def video_quality(
     """Quality of a reconstruction from clicks."""
     peaks, times = peaks_of(motion)
     nulls = {name: float(getattr(null, name)) for name in peaks}
-    sigma, measured = click_noise(motion, camera, tracks.seen[motion.used])
+    sigma, measured = click_noise(motion, camera, tracks)
     freedom = frames.degrees_of_freedom[motion.used]
     rmse = frames.rmse_px[motion.used]
     nyquist = 0.5 * camera.fps

@@ -57,10 +57,21 @@ class Tracks:
         ``(k,)`` consecutive frame numbers.
     pixels
         ``(k, n, 2)`` [px]; NaN where a landmark was not clicked.
+    weight
+        ``(k, n)`` in (0, 1]: a click's variance is that of a careful click over its weight. Default 1.
     """
 
     frames: np.ndarray
     pixels: np.ndarray
+    weight: np.ndarray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.weight is None:
+            object.__setattr__(self, "weight", np.ones(self.pixels.shape[:2]))
+
+    def sigma_px(self, click_sigma_px: float) -> np.ndarray:
+        """``(k, n)`` standard deviation of a click coordinate, where `click_sigma_px` is a careful click's [px]."""
+        return click_sigma_px / np.sqrt(self.weight)
 
     @property
     def seen(self) -> np.ndarray:
