@@ -78,7 +78,7 @@ def collect(stage: Stage) -> ReportInput:
             for name, facts in limits.gates.items()
         },
         "stages": _stages(stage),
-        "t0_s": quality["t0_s"],
+        "t0_s": quality["driving_t0_s"],
         "kinematics": _table(stage, "reconstruction", "kinematics.csv"),
         "quality": _table_two(stage, limits) if quality["kind"] == "clicks" else (),
         "parts": _parts(stage, model),
@@ -131,7 +131,7 @@ def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> 
         "struck player": play.struck_player,
         "source": "clicked video" if play.source.kind == "clicks" else "wearable",
         "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
-        "t0": f"{1e3 * quality['t0_s']:.1f} ms (peak {play.t0} acceleration)",
+        "t0": f"{1e3 * quality['driving_t0_s']:.1f} ms (peak {play.t0} acceleration)",
         "window": f"{1e3 * play.window.duration_s:g} ms from {1e3 * play.window.before_t0_s:g} ms before t0",
         "helmet": f"{play.helmet.model}, {play.helmet.mass_kg:g} kg",
         "model": f"{play.model.preset}, {play.model.resolution}",
