@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from replay.motion.families import Truth, draw
+from replay.motion.focal import ClipFocal
+from replay.motion.pose import Poses
 from replay.motion.posterior import PosteriorMotion, reconstruct_posterior
 from replay.motion.protocol import ProtocolMotion, reconstruct_clicks
 from replay.motion.settings import CameraSettings, Cutoffs
@@ -59,6 +61,7 @@ class Clip:
     tracks: Tracks
     template: Template
     camera: CameraSettings
+    focal_px: float
 
 
 def film(footage: Footage, family: str, seed: int, *, quiet: bool = False) -> Clip:
@@ -95,7 +98,7 @@ def film(footage: Footage, family: str, seed: int, *, quiet: bool = False) -> Cl
         lens="zoom" if footage.zoom_per_s else "fixed",
         click_sigma_px=footage.sigma_px,
     )
-    return Clip(truth, seen_by.times, Tracks(np.arange(len(pixels)), pixels), Template(names, points), camera)
+    return Clip(truth, seen_by.times, Tracks(np.arange(len(pixels)), pixels), Template(names, points), camera, focal)
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
@@ -116,9 +119,15 @@ def _hidden(rng: np.random.Generator, shape: tuple[int, int], share: float) -> n
     return hidden
 
 
-def both_modes(clip: Clip) -> tuple[ProtocolMotion, PosteriorMotion]:
-    """Protocol mode and posterior mode of a clip."""
-    protocol = reconstruct_clicks(clip.tracks, clip.template, clip.camera)
+def both_modes(clip: Clip, *, known_focal: bool = False) -> tuple[ProtocolMotion, PosteriorMotion]:
+    """Protocol mode and posterior mode of a clip; a known focal length makes protocol mode a mere start, but quick."""
+    focal = None
+    if known_focal:
+        guess, flat = np.log(clip.focal_px), np.zeros((0, 3))
+        focal = ClipFocal(
+            guess, 0.02, 1.0, Poses(np.zeros((0, 3, 3)), flat, flat[:, 0], flat[:, 0], np.zeros((0, 7, 7)))
+        )
+    protocol = reconstruct_clicks(clip.tracks, clip.template, clip.camera, clip=focal)
     return protocol, reconstruct_posterior(clip.tracks, clip.template, clip.camera, protocol)
 
 

@@ -29,8 +29,8 @@ RATIOS = ("omega_rad_per_s", "alpha_rad_per_s2", "a_m_per_s2", "a_across_m_per_s
 QUANTITIES = (*RATIOS, "t0_s")
 CURVES = ("omega", "alpha", "a")
 """Curves over time, whose bands are a multiple of the posterior's standard deviation."""
-_LEAST = {"t0_s": 2.0e-4}
-_LEAST_SHARE = 0.005
+_LEAST = {"t0_s": 5.0e-4, "omega_rad_per_s": 0.01}
+_LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)

@@ -104,12 +104,18 @@ def event_aligned(duration_s: float, rank: int = 8) -> Shape:
 
 
 @cache
-def shapes() -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
-    """Return the shapes that are averaged over: pulses, event-aligned ones."""
-    return (
-        tuple(pulse(d, a) for d in (0.006, 0.010, 0.015, 0.022, 0.032) for a in (0.035, 0.070, 0.140)),
-        tuple(event_aligned(d) for d in (0.008, 0.016, 0.032)),
-    )
+def few_shapes() -> tuple[Shape, ...]:
+    """Return shapes far enough apart to find an event's instant by."""
+    pulses = tuple(pulse(d, a) for d in (0.008, 0.015, 0.028) for a in (0.050, 0.120))
+    return (*pulses, event_aligned(0.016))
+
+
+@cache
+def shapes() -> tuple[Shape, ...]:
+    """Return the shapes that are averaged over; neighbours differ by less than good footage could tell."""
+    durations = (0.005, 0.0065, 0.008, 0.010, 0.012, 0.0145, 0.0175, 0.021, 0.026, 0.032)
+    pulses = tuple(pulse(d, a) for d in durations for a in (0.035, 0.055, 0.085, 0.140))
+    return (*pulses, *(event_aligned(d) for d in (0.008, 0.012, 0.018, 0.027)))
 
 
 def background(

@@ -16,6 +16,7 @@ from replay.motion.pose import mirrored, refine
 from replay.motion.protocol import ProtocolMotion
 
 _APART_RAD = np.radians(8.0)
+_JUMP_RAD = 0.6
 
 
 def starts(problem: Problem, motion: ProtocolMotion) -> list[State]:
@@ -40,7 +41,29 @@ def starts(problem: Problem, motion: ProtocolMotion) -> list[State]:
                 previous = pairs[0][choice[k], k]
         index = np.arange(len(choice))
         found.append(_bridged(motion, pairs[0][choice, index], pairs[1][choice, index]))
-    return found
+    found.append(_without_jumps(found[0]))
+    return [state for i, state in enumerate(found) if all(_differs(state, other) for other in found[:i])]
+
+
+def _differs(one: State, other: State) -> bool:
+    """Whether two starts are far enough apart anywhere to end apart."""
+    turn = Rotation.from_matrix(np.swapaxes(one.rotation, 1, 2) @ other.rotation).magnitude()
+    return bool(turn.max() > 0.1 * _APART_RAD)
+
+
+def _without_jumps(state: State) -> State:
+    """The same path carried over frames that jump out of it and back: what one wild click can do to few landmarks."""
+    rotation = Rotation.from_matrix(state.rotation)
+    turn = (rotation[1:] * rotation[:-1].inv()).as_rotvec()
+    jumps = np.zeros(len(rotation), dtype=bool)
+    jumps[1:-1] = np.linalg.norm(np.diff(turn, axis=0), axis=1) > _JUMP_RAD
+    kept = np.flatnonzero(~jumps)
+    if len(kept) < 3:
+        return state
+    every = np.clip(np.arange(len(rotation)), kept[0], kept[-1])
+    between = Slerp(kept, rotation[kept])(every).as_matrix()
+    columns = [np.interp(np.arange(len(rotation)), kept, state.shift[kept, i]) for i in range(3)]
+    return State(between, np.stack(columns, axis=1), state.log_f)
 
 
 def _bridged(motion: ProtocolMotion, rotation: np.ndarray, shift: np.ndarray) -> State:

@@ -16,7 +16,7 @@ from replay.motion.readout import ANGULAR, LINEAR, read_out
 from replay.motion.settings import CameraSettings
 from replay.motion.tracks import Template, Tracks
 
-DRAWS = 400
+DRAWS = 200
 NULL_REPLICATES = 8
 _SEED = 590940
 _MOST_FRAMES = 120

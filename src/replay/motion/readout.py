@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from replay.motion.events import Shape, background, shapes
+from replay.motion.events import Shape, background, few_shapes, shapes
 
 EVENT_PRIOR = 0.5
 """Probability of an event beforehand: a head that turns quietly is as likely as one that is struck."""
 _OFF_AXIS = 0.25
 _FINE_S = 1.0e-3
 _NEGLIGIBLE = 1.0e-3
+_MOST_INSTANTS = 40
 
 
 @dataclass(frozen=True)
@@ -207,15 +208,15 @@ def read_out(
     def prior(instants: np.ndarray) -> np.ndarray:
         return 0.0 * instants if instant is None else -0.5 * ((instants - instant[0]) / instant[1]) ** 2
 
-    every = [shape for kind in shapes() for shape in kind]
-    fits = [fit for shape in every for fit in _fits(frames, shape, coarse, scales.event, round_axis)]
+    fits = [fit for shape in few_shapes() for fit in _fits(frames, shape, coarse, scales.event, round_axis)]
     weights, _ = _weights(fits, prior(coarse))
     axis = _leading_axis(fits, weights)
     share = np.sum(weights, axis=0)
-    likely = coarse[share > _NEGLIGIBLE * share.max()]
+    threshold = max(_NEGLIGIBLE * share.max(), np.sort(share)[-min(_MOST_INSTANTS, len(share))])
+    likely = coarse[share >= threshold]
     fine = np.unique(np.concatenate([likely + shift * step / 3.0 for shift in (-1.0, 0.0, 1.0)]))
     aligned = axis[:, None] * axis + _OFF_AXIS * (np.eye(3) - axis[:, None] * axis)
-    fits = [fit for shape in every for fit in _fits(frames, shape, fine, scales.event, [np.eye(3), aligned])]
+    fits = [fit for shape in shapes() for fit in _fits(frames, shape, fine, scales.event, [np.eye(3), aligned])]
     # both passes must spread the same prior over time: as many instants as the whole clip has at this spacing
     weights, none = _weights(fits, prior(fine) + np.log(len(fine) / (3.0 * len(coarse))))
     return _draw(frames, fits, weights, none, rng, draws)
