@@ -19,7 +19,7 @@ import numpy as np
 from footage import RECORDS, Clip, Footage, both_modes, film, true_peaks
 from scipy.spatial.transform import Rotation
 
-from replay.motion.bands import QUANTITIES, RATIOS, Spread, constants, spread
+from replay.motion.bands import QUANTITIES, Spread, constants, spread
 from replay.motion.families import TESTING
 from replay.motion.posterior import PosteriorMotion
 from replay.motion.protocol import ProtocolMotion, peak_frame
@@ -80,12 +80,13 @@ def run(names: list[str]) -> None:
 
 def measure(clip: Clip, protocol: ProtocolMotion, posterior: PosteriorMotion) -> dict[str, Any]:
     """Everything the table needs of one clip: truth, draws' spreads and protocol mode's values."""
-    truth, time = true_peaks(clip, posterior)
+    truth, _ = true_peaks(clip, posterior)
     peaks = posterior.peaks
     index, at = posterior.at_frames
     inner = slice(1, -1)
     exact = clip.truth.at(clip.times)
     k = protocol.kinematics
+    raw = k.omega_rad_per_s - exact.omega_rad_per_s
     curve = posterior.draws.omega_rad_per_s[:, at]
     error = curve.mean(axis=0) - exact.omega_rad_per_s[index]
     scaled = np.abs(error / curve.std(axis=0))[inner]
@@ -99,9 +100,7 @@ def measure(clip: Clip, protocol: ProtocolMotion, posterior: PosteriorMotion) ->
         "protocol_alpha": float(k.alpha_resultant[inner].max()),
         "protocol_t0_s": float(k.time_s[peak_frame(k.alpha_resultant)]),
         "rmse": float(np.sqrt(np.mean(np.sum(error[inner] ** 2, axis=1)))),
-        "protocol_rmse": float(
-            np.sqrt(np.mean(np.sum((k.omega_rad_per_s - exact.omega_rad_per_s)[inner] ** 2, axis=1)))
-        ),
+        "protocol_rmse": float(np.sqrt(np.mean(np.sum(raw[inner] ** 2, axis=1)))),
         "scaled": [round(float(v), 2) for v in scaled.ravel()],
         "flip_margin": min(posterior.flip_margin, 1e3),
         "flipped": bool(np.quantile(off, 0.75) > np.radians(20.0)),
@@ -119,7 +118,7 @@ HEADER = (
 
 
 def line(cell: Cell, rows: list[dict[str, Any]]) -> str:
-    """One row: errors as median / 90th percentile; a quantity covered in no clip because it is not resolvable says so."""
+    """One row: errors as median / 90th percentile; coverage counts the clips whose band is no wider than allowed."""
     told = {n: [constants().peaks[n].apply(n, Spread(*r["spread"][n])) for r in rows] for n in QUANTITIES}
     true = {n: np.array([r["truth"][n] for r in rows]) for n in QUANTITIES}
     omega = np.array([b.value for b in told["omega_rad_per_s"]])

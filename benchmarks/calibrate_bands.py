@@ -48,7 +48,7 @@ def collect(path: Path, clips: int) -> None:
     for seed in range(done, clips):
         family = BUILDING[seed % len(BUILDING)]
         clip = film(footage_of(seed), family, 100_000 + seed)
-        _, posterior = both_modes(clip, known_focal=True)
+        _, posterior = both_modes(clip)
         truth, time = true_peaks(clip, posterior)
         margin = 1.0 / clip.camera.fps
         peaks = posterior.draws.peaks(margin)

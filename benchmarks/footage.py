@@ -119,14 +119,14 @@ def _hidden(rng: np.random.Generator, shape: tuple[int, int], share: float) -> n
     return hidden
 
 
-def both_modes(clip: Clip, *, known_focal: bool = False) -> tuple[ProtocolMotion, PosteriorMotion]:
-    """Protocol mode and posterior mode of a clip; a known focal length makes protocol mode a mere start, but quick."""
-    focal = None
-    if known_focal:
-        guess, flat = np.log(clip.focal_px), np.zeros((0, 3))
-        focal = ClipFocal(
-            guess, 0.02, 1.0, Poses(np.zeros((0, 3, 3)), flat, flat[:, 0], flat[:, 0], np.zeros((0, 7, 7)))
-        )
+def both_modes(clip: Clip) -> tuple[ProtocolMotion, PosteriorMotion]:
+    """Protocol mode and posterior mode of a clip.
+
+    Protocol mode is spared the search for the clip's focal length (half its time) and given the true one: an
+    advantage, if any, over what the distance known to 2 % would tell it. Posterior mode takes the distance.
+    """
+    none = np.zeros(0)
+    focal = ClipFocal(float(np.log(clip.focal_px)), 0.02, 1.0, Poses(none, none, none, none, none))
     protocol = reconstruct_clicks(clip.tracks, clip.template, clip.camera, clip=focal)
     return protocol, reconstruct_posterior(clip.tracks, clip.template, clip.camera, protocol)
 

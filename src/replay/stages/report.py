@@ -80,6 +80,7 @@ def collect(stage: Stage) -> ReportInput:
         "stages": _stages(stage),
         "t0_s": quality["driving_t0_s"],
         "kinematics": _table(stage, "reconstruction", "kinematics.csv"),
+        "peaks": _table(stage, "reconstruction", "peaks.csv") if quality["kind"] == "clicks" else None,
         "quality": _table_two(stage, limits) if quality["kind"] == "clicks" else (),
         "parts": _parts(stage, model),
         "parameters": _parameters(model),
