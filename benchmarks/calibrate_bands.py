@@ -23,14 +23,10 @@ from replay.motion.families import BUILDING
 LEVEL = 0.95
 RANGES = {"fps": (59.94, 239.76), "landmarks": (4.0, 10.0), "px_per_m": (120.0, 2500.0), "sigma_px": (0.7, 4.0)}
 
-_FAR_CLIPS = 53
-"""The first clips were filmed before close-ups were added to the range."""
-
-
 def footage_of(seed: int) -> Footage:
     """Footage at random: half of it at 59.94 fps, where it is needed most."""
     rng = np.random.default_rng([7, seed])
-    px_per_m = float(np.exp(rng.uniform(np.log(120.0), np.log(1200.0 if seed < _FAR_CLIPS else 2500.0))))
+    px_per_m = float(np.exp(rng.uniform(np.log(120.0), np.log(2500.0))))
     return Footage(
         fps=float(rng.choice([59.94, 119.88, 239.76], p=[0.6, 0.2, 0.2])),
         landmarks=int(rng.choice([4, 6, 8, 10])),

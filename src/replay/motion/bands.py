@@ -76,8 +76,6 @@ class Calibration:
         Added to the centre, in widths.
     below, above
         Bounds' distances from the shifted centre, in widths.
-    range
-        Least and greatest width of the calibration set.
     """
 
     widths: tuple[float, ...]

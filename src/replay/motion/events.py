@@ -106,15 +106,15 @@ def event_aligned(duration_s: float, rank: int = 8) -> Shape:
 @cache
 def few_shapes() -> tuple[Shape, ...]:
     """Return shapes far enough apart to find an event's instant by."""
-    pulses = tuple(pulse(d, a) for d in (0.008, 0.015, 0.028) for a in (0.050, 0.120))
+    pulses = tuple(pulse(d, a) for d in (0.008, 0.015, 0.028) for a in (0.020, 0.050, 0.120))
     return (*pulses, event_aligned(0.016))
 
 
 @cache
 def shapes() -> tuple[Shape, ...]:
     """Return the shapes that are averaged over; neighbours differ by less than good footage could tell."""
-    durations = (0.005, 0.0065, 0.008, 0.010, 0.012, 0.0145, 0.0175, 0.021, 0.026, 0.032)
-    pulses = tuple(pulse(d, a) for d in durations for a in (0.035, 0.055, 0.085, 0.140))
+    durations = (0.005, 0.007, 0.0095, 0.0125, 0.0165, 0.022, 0.030)
+    pulses = tuple(pulse(d, a) for d in durations for a in (0.015, 0.030, 0.055, 0.090, 0.140))
     return (*pulses, *(event_aligned(d) for d in (0.008, 0.012, 0.018, 0.027)))
 
 

@@ -154,12 +154,12 @@ class _Sizes:
     lead_s: float
 
 
-def _sizes(rng: np.random.Generator) -> _Sizes:
+def _sizes(rng: np.random.Generator, least_arrest_s: float = 0.040) -> _Sizes:
     """Sizes of an impact: 18-50 rad/s over 8-25 ms, 1.5-6 m/s over 7-20 ms."""
     return _Sizes(
         gain_rad_per_s=float(np.exp(rng.uniform(np.log(18.0), np.log(50.0)))),
         duration_s=float(np.exp(rng.uniform(np.log(0.008), np.log(0.025)))),
-        arrest_s=float(rng.uniform(0.040, 0.120)),
+        arrest_s=float(np.exp(rng.uniform(np.log(least_arrest_s), np.log(0.120)))),
         share=float(rng.uniform(0.5, 1.2)),
         speed_m_per_s=float(np.exp(rng.uniform(np.log(1.5), np.log(6.0)))),
         push_s=float(np.exp(rng.uniform(np.log(0.007), np.log(0.020)))),
@@ -177,7 +177,7 @@ def _unit(pulse: np.ndarray) -> np.ndarray:
 
 def _impact(rng: np.random.Generator, t: np.ndarray, pulse: Callable[[np.ndarray, float], np.ndarray]) -> tuple:
     """Pulse, arrest by a slower pulse of the same kind, and a push of the CG."""
-    s, axis = _sizes(rng), _direction(rng)
+    s, axis = _sizes(rng, least_arrest_s=0.015), _direction(rng)
     up = _unit(pulse(t + 0.5 * s.duration_s, s.duration_s))
     down = _unit(pulse(t - 0.5 * s.duration_s, s.arrest_s))
     rate = np.cumsum(s.gain_rad_per_s * (up - s.share * down)) * STEP_S
