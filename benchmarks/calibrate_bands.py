@@ -23,6 +23,7 @@ from replay.motion.families import BUILDING
 LEVEL = 0.95
 RANGES = {"fps": (59.94, 239.76), "landmarks": (4.0, 10.0), "px_per_m": (120.0, 2500.0), "sigma_px": (0.7, 4.0)}
 
+
 def footage_of(seed: int) -> Footage:
     """Footage at random: half of it at 59.94 fps, where it is needed most."""
     rng = np.random.default_rng([7, seed])

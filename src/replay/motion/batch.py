@@ -337,7 +337,11 @@ def _descend(problem: Problem, state: State, sigma: float, iterations: int) -> t
     for _ in range(iterations):
         damped = normal.band.copy()
         damped[0] *= 1.0 + damping
-        step = solveh_banded(damped, normal.slope.ravel(), lower=True).reshape(-1, UNKNOWNS)
+        try:
+            step = solveh_banded(damped, normal.slope.ravel(), lower=True).reshape(-1, UNKNOWNS)
+        except np.linalg.LinAlgError:  # rounding made it indefinite: a shorter step is a safer one
+            damping *= 100.0
+            continue
         largest = max(np.abs(step[:, :3]).max() / 0.5, np.abs(step[:, 5:]).max() / 0.5, 1.0)
         step = step / largest
         tried = state.moved(step)

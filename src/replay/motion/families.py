@@ -257,10 +257,15 @@ _PULSES = {
 }
 
 
+_SETTLING_SAMPLES = 5
+
+
 def _measured(rng: np.random.Generator, t: np.ndarray, records: Path) -> tuple[np.ndarray, np.ndarray]:
     """One measured impact, turned at random, scaled by 0.7 to 1.3, faded in and out where the record ends."""
     files = sorted(Path(records).glob("impact_*.csv"))
     table = MOUTHGUARD.read(files[rng.integers(len(files))])
+    # the device's own filter rings up over the first milliseconds of a record: no motion of the head
+    table = table.iloc[_SETTLING_SAMPLES:-_SETTLING_SAMPLES]
     clock = table["time_ms"].to_numpy() * 1e-3
     omega = table[[f"ang_vel_{a}_rad_s" for a in "xyz"]].to_numpy()
     push = table[[f"lin_acc_{a}_g" for a in "xyz"]].to_numpy() * STANDARD_GRAVITY

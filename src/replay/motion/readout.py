@@ -138,9 +138,7 @@ class _Frames:
         return level - level[:, :1]
 
 
-def _fits(
-    frames: _Frames, shape: Shape, instants: np.ndarray, size: float, axes: list[np.ndarray]
-) -> Iterator[_Fits]:
+def _fits(frames: _Frames, shape: Shape, instants: np.ndarray, size: float, axes: list[np.ndarray]) -> Iterator[_Fits]:
     white = frames.whiten(frames.event_at_frames(shape, instants))
     inner = np.swapaxes(white, 1, 2) @ white
     pull = np.einsum("hmi,m->hi", white, frames.white)
