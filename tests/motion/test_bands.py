@@ -51,9 +51,9 @@ def test_bands_of_half_the_width_would_not(told):
     assert covered(told, 0.5) < 0.85
 
 
-def test_the_peak_is_read_to_a_few_per_cent(told):
+def test_the_peak_is_read_as_well_as_the_table_says(told):
     error = [abs(found.value / truth - 1.0) for found, truth in told]
-    assert np.median(error) < 0.08
+    assert np.median(error) < 0.12
 
 
 def test_families_that_build_do_not_test():
@@ -66,4 +66,4 @@ def test_every_quantity_has_constants():
     for name in RATIOS:
         calibration = constants().peaks[name]
         assert sorted(calibration.widths) == list(calibration.widths)
-        assert min(calibration.below + calibration.above) > 0.0
+        assert min(calibration.reach) > 0.0

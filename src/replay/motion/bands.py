@@ -74,22 +74,21 @@ class Calibration:
         Knots.
     shift
         Added to the centre, in widths.
-    below, above
-        Bounds' distances from the shifted centre, in widths.
+    reach
+        Distance of either bound from the shifted centre, in widths.
     """
 
     widths: tuple[float, ...]
     shift: tuple[float, ...]
-    below: tuple[float, ...]
-    above: tuple[float, ...]
+    reach: tuple[float, ...]
 
     def apply(self, name: str, found: Spread) -> Band:
         """Shift and widen."""
         at = float(np.log(found.width))
         knots = np.log(self.widths)
-        shift, below, above = (float(np.interp(at, knots, values)) for values in (self.shift, self.below, self.above))
+        shift, reach = (float(np.interp(at, knots, values)) for values in (self.shift, self.reach))
         centre = found.centre + shift * found.width
-        bounds = centre - below * found.width, centre, centre + above * found.width
+        bounds = centre - reach * found.width, centre, centre + reach * found.width
         if name in RATIOS:
             low, value, high = (float(np.exp(x)) for x in bounds)
             return Band(value, low, high, high <= WIDEST_RATIO * low)
