@@ -49,8 +49,9 @@ def summary(result: Reconstruction) -> str:
         noise = f"{null / scale:10.4g}  {quality.peaks[name] / null:8.2f}" if null else "         -         -"
         lines.append(f"{label:28s} {value:10.4g} {unit:8s} {noise}  {quality.peak_times_s[name] * 1e3:9.2f}")
     lines += ["", "Quality (verdicts are in gate.json)"]
+    told = posterior.gate_values() if posterior else {}
     for name, item in quality.values.items():
-        if name.endswith("_detail"):
+        if name.endswith("_detail") or name in told:
             continue
         shown = f"{item:.4g}" if isinstance(item, float) else str(item)
         lines.append(f"  {name:34s} {shown}")
