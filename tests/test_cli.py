@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
 import pytest
 
+from replay import cli
 from replay.cli import main
 from replay.doctor import lock_finding
+from replay.motion.synthetic import PULSES
 
 
 @pytest.fixture
@@ -80,6 +83,52 @@ def test_a_synthetic_play_can_be_made_and_checked(plays: Path, kind: str, capsys
     assert main(["inputs", "mine", "--plays", "plays"]) == 0
     assert main(["synth", kind, "--into", "plays/mine"]) == 2
     assert "the folder is not empty" in said(capsys)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        [
+            "--family",
+            "double",
+            "--draw",
+            "--landmarks",
+            "10",
+            "--occlusion",
+            "0.1",
+            "--outliers",
+            "0.04",
+            "--blur",
+            "0.3",
+        ],
+        ["--motion", "plays/demo/truth.csv", "--fps", "240", "--zoom", "0.1"],
+        ["--pan", "0.1", "--row-time", "1e-5"],
+    ],
+)
+def test_any_footage_can_be_made_and_its_tracks_pass_the_door(
+    plays: Path, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["synth", "footage", "--into", "plays/mine", "--seed", "7", *options]) == 0
+    assert main(["settings", "mine", "--plays", "plays"]) == 0
+    assert main(["inputs", "mine", "--plays", "plays"]) == 0
+    facts = json.loads(Path("results/mine/inputs/inputs.json").read_text())["facts"]
+    assert facts["frames"] > 15
+    assert ("pan" in facts) == ("--pan" in options)
+    assert ("rolling_shutter" in facts) == ("--row-time" in options)
+    first = Path("plays/mine/kinovea_clicks.csv").read_bytes()
+    assert main(["synth", "footage", "--into", "plays/again", "--seed", "7", *options]) == 0
+    assert Path("plays/again/kinovea_clicks.csv").read_bytes() == first
+
+
+def test_the_command_line_offers_the_generators_pulses() -> None:
+    assert set(cli._PULSES) == set(PULSES)
+
+
+def test_a_record_that_is_none_is_named(plays: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record = str(plays / "demo" / "helmet_landmarks.csv")
+    assert main(["synth", "footage", "--into", "plays/mine", "--motion", record]) == 2
+    assert "time_s" in said(capsys)
+    assert not Path("plays/mine").exists()
 
 
 def test_a_model_can_be_built_by_itself(plays: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -167,3 +167,12 @@ def test_a_play_may_lie_elsewhere(demo, tmp_path):
     play = load_play(demo)
     assert play.lying_in(tmp_path).files[0] == tmp_path / "kinovea_clicks.csv"
     assert play.files[0] == demo / "kinovea_clicks.csv"
+
+
+def test_what_is_withheld_must_be_there_and_have_a_reason(demo):
+    spoil(demo, "gates: {}", "withhold: {video.mp4: belongs to the league}\ngates: {}")
+    assert "'video.mp4' cannot be withheld" in message(demo)
+    (demo / "video.mp4").write_bytes(b"frames")
+    assert load_play(demo).withhold == {"video.mp4": "belongs to the league"}
+    spoil(demo, "belongs to the league", "''")
+    assert "video.mp4 is withheld for no reason" in message(demo)

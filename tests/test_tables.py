@@ -104,3 +104,10 @@ def test_a_wrong_set_of_columns_is_our_own_mistake(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="missing or unknown"):
         CLICKS.write(tmp_path / "x.csv", {"frame": [1]})
     assert not (tmp_path / "x.csv").exists()
+
+
+def test_a_quotation_mark_that_never_closes_and_a_table_of_nothing_are_named(tmp_path):
+    with pytest.raises(InputError, match="no table of cells"):
+        CLICKS.read(written(tmp_path, 'frame,landmark_id,u_px,weight\n1,"LM1,2,3\n' + "1,LM1,2,3\n" * 20000))
+    with pytest.raises(InputError, match="every cell is empty"):
+        CLICKS.read(written(tmp_path, '""\n" "\n'))

@@ -1,7 +1,7 @@
 """The command line: one sub-command a stage, and the only place that parses arguments.
 
-Exit codes: 0 done, 1 a bundle that does not verify or a run that could not go on, 2 an input that cannot be
-used, 3 a gate that refuses the play.
+Exit codes: 0 done, 1 a bundle that does not verify, runs that differ or a run that could not go on, 2 an input
+that cannot be used, 3 a gate that refuses the play.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from replay import __version__
 from replay.errors import ReplayError
@@ -32,6 +33,7 @@ _STAGES: dict[str, tuple[str, str]] = {
     "seal": ("seal", "the sealed bundle"),
 }
 _ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
+_PULSES = ("sine_squared", "half_sine", "triangle", "skewed", "double")
 _SOLVING = ("shake", "impact", "sensitivity")
 
 
@@ -60,6 +62,12 @@ def _parser() -> argparse.ArgumentParser:
                 action="store_true",
                 help="record a failed gate, let later stages skip themselves, exit 0: rejected plays are sealed too",
             )
+        if name == "seal":
+            command.add_argument(
+                "--interrupted",
+                action="store_true",
+                help="seal what there is of a run that did not come to its end; the bundle says so",
+            )
         if name in _SOLVING:
             command.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
             command.add_argument(
@@ -69,19 +77,49 @@ def _parser() -> argparse.ArgumentParser:
     verdict = commands.add_parser("verdict", help="print the verdict of a finished run; exit 3 when it is rejected")
     verdict.add_argument("results", type=Path, help="results/<play>")
 
-    verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
-    verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
-
-    compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
-    compare.add_argument("old", type=Path)
-    compare.add_argument("new", type=Path)
+    _add_bundle_tools(commands)
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
-    synth.add_argument("kind", choices=["demo", "broadcast", "wearable"], help="which camera or sensor sees the impact")
+    synth.add_argument(
+        "kind", choices=["demo", "broadcast", "wearable", "footage"], help="a shipped play, or any footage"
+    )
     synth.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for the play")
     synth.add_argument(
         "--seed", type=int, default=None, help="seed of the click or sensor noise (default: the shipped play's)"
     )
+
+    footage = synth.add_argument_group("footage", "what the camera sees and what spoils the clicks (kind footage only)")
+    footage.add_argument("--family", default="sine_squared", choices=_PULSES, help="shape of the impact's pulses")
+    footage.add_argument(
+        "--draw", action="store_true", help="draw the impact from the seed instead of the standard one"
+    )
+    footage.add_argument("--motion", type=Path, metavar="KINEMATICS.csv", help="film this record instead of an impact")
+    footage.add_argument("--fps", type=_above_0, default=59.94, help="frame rate [Hz] (default 59.94)")
+    footage.add_argument("--distance", type=_above_0, default=20.0, metavar="M", help="camera to head (default 20)")
+    footage.add_argument("--focal", type=_above_0, default=6000.0, metavar="PX", help="focal length (default 6000)")
+    footage.add_argument("--landmarks", type=int, default=8, choices=range(3, 11), help="how many (default 8)")
+    footage.add_argument("--click-sigma", type=_not_negative, default=1.0, metavar="PX", help="noise (default 1)")
+    footage.add_argument("--blur", type=_not_negative, default=0.0, metavar="SHARE", help="of the streak, added to it")
+    footage.add_argument("--occlusion", type=_not_negative, default=0.0, metavar="SHARE", help="of the clicks hidden")
+    footage.add_argument("--outliers", type=_not_negative, default=0.0, metavar="SHARE", help="of the clicks wild")
+    footage.add_argument("--zoom", type=float, default=0.0, metavar="PER_S", help="rate of log focal length")
+    footage.add_argument("--pan", type=float, default=0.0, metavar="RAD_PER_S", help="with three static points")
+    footage.add_argument("--row-time", type=_not_negative, default=0.0, metavar="S", help="rolling shutter")
+
+    digitize = commands.add_parser("digitize", help="follow clicked landmarks through a video -> click table")
+    digitize.add_argument("video", type=Path, help="the video")
+    digitize.add_argument(
+        "--seeds", type=Path, required=True, metavar="SEEDS.csv", help="click table with a few clicks"
+    )
+    digitize.add_argument("--out", type=Path, required=True, metavar="CLICKS.csv", help="click table of every frame")
+    digitize.add_argument("--first", type=int, default=None, help="first frame (default: that of the first click)")
+    digitize.add_argument(
+        "--last", type=int, default=None, help="last frame (default: that of the last click, or the video's)"
+    )
+    digitize.add_argument(
+        "--click-sigma", type=_not_negative, default=1.0, metavar="PX", help="noise of your own clicks (default 1)"
+    )
+    digitize.add_argument("--patch", type=_positive, default=21, metavar="PX", help="side of the patch (default 21)")
 
     model = commands.add_parser("model", help="build a head and helmet model by itself")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
@@ -108,6 +146,50 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+_BUNDLE_TOOLS = ("verify", "compare", "show", "table", "agree", "rerun", "sign")
+
+
+def _add_bundle_tools(commands: Any) -> None:
+    """Commands for whoever received a bundle."""
+    verify = commands.add_parser("verify", help="check a sealed bundle: bytes, completeness, crate")
+    verify.add_argument("bundle", type=Path, help="<play>.zip or an unpacked bundle folder")
+    verify.add_argument("--signers", type=Path, metavar="FILE", help="also check its signature (allowed signers)")
+
+    compare = commands.add_parser("compare", help="compare two bundles or results folders artifact by artifact")
+    compare.add_argument("old", type=Path)
+    compare.add_argument("new", type=Path)
+    show = commands.add_parser("show", help="a bundle on one screen: play, verdict, gates, versions")
+    show.add_argument("bundle", type=Path, help="bundle, unpacked bundle or results/<play>")
+    table = commands.add_parser("table", help="many bundles in one table: CSV and HTML")
+    table.add_argument("bundles", type=Path, nargs="+", metavar="BUNDLE", help="results/*/bundle/*.zip")
+    table.add_argument("--out", type=Path, default=Path("plays"), metavar="NAME", help="writes NAME.csv, NAME.html")
+    agree = commands.add_parser("agree", help="do laboratories recover one driver from one play? exit 3 when not")
+    agree.add_argument(
+        "bundles", type=Path, nargs="+", metavar="BUNDLE", help="bundles or results folders, two or more"
+    )
+    agree.add_argument("--out", type=Path, metavar="FILE.json", help="also write all of it as JSON")
+    rerun = commands.add_parser("rerun", help="make a bundle again from itself alone, and compare")
+    rerun.add_argument("bundle", type=Path)
+    rerun.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for all of it")
+    rerun.add_argument("--yes", action="store_true", help="do not ask before running what came with the bundle")
+    rerun.add_argument("--environment", type=Path, metavar="VENV", help="use this environment, not the bundle's lock")
+    rerun.add_argument("--withheld", type=Path, metavar="FOLDER", help="has the files the bundle names by hash alone")
+    rerun.add_argument("--cores", type=_positive, help="for the workflow (default: all)")
+    sign = commands.add_parser("sign", help="sign a bundle with an SSH key; the signature lies beside it")
+    sign.add_argument("bundle", type=Path)
+    sign.add_argument("--key", type=Path, required=True, help="private SSH key")
+
+
+def _run_bundle_tool(arguments: argparse.Namespace) -> int:
+    import importlib
+
+    # One module a command, so that verifying loads no solver.
+    module = "bundles" if arguments.command in ("verify", "compare", "sign") else arguments.command
+    tool = getattr(importlib.import_module(f"replay.stages.{module}"), arguments.command)
+    given = {name: value for name, value in vars(arguments).items() if name != "command"}
+    return tool(**given)
+
+
 def _add_workspace(command: argparse.ArgumentParser) -> None:
     command.add_argument("play", help="name of the play: a folder of --plays")
     command.add_argument("--plays", type=Path, default=Path("config/plays"), help="folder of the plays")
@@ -122,6 +204,22 @@ def _positive(text: str) -> int:
     return number
 
 
+def _above_0(text: str) -> float:
+    number = _not_negative(text)
+    if number == 0.0:
+        message = "must be above 0"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
+def _not_negative(text: str) -> float:
+    number = float(text)
+    if not 0.0 <= number < float("inf"):
+        message = "must be a number, at least 0"
+        raise argparse.ArgumentTypeError(message)
+    return number
+
+
 def _run_stage(arguments: argparse.Namespace) -> int:
     import importlib
 
@@ -132,6 +230,8 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     options: dict[str, object] = {}
     if arguments.command == "settings":
         options["resolution"] = None if arguments.resolution == "as-the-play-says" else arguments.resolution
+    if arguments.command == "seal":
+        options["interrupted"] = arguments.interrupted
     if arguments.command in _SOLVING:
         options |= {"threads": arguments.threads, "checkpoint_every_s": arguments.checkpoint_every}
     refusal = module.run(workspace, **options)
@@ -146,9 +246,19 @@ def _run_tool(arguments: argparse.Namespace) -> int:
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
-        "verify": lambda: tools.verify_bundle(arguments.bundle),
-        "compare": lambda: tools.compare_bundles(arguments.old, arguments.new),
-        "synth": lambda: tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed),
+        "synth": lambda: (
+            tools.write_synthetic_footage(vars(arguments))
+            if arguments.kind == "footage"
+            else tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed)
+        ),
+        "digitize": lambda: tools.digitise_video(
+            arguments.video,
+            arguments.seeds,
+            arguments.out,
+            (arguments.first, arguments.last),
+            arguments.click_sigma,
+            arguments.patch,
+        ),
         "model": lambda: tools.write_model_file(
             arguments.preset, arguments.resolution, arguments.out, arguments.preview
         ),
@@ -183,6 +293,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             from replay.doctor import examine
 
             return examine()
+        if arguments.command in _BUNDLE_TOOLS:
+            return _run_bundle_tool(arguments)
         return _run_stage(arguments) if arguments.command in _STAGES else _run_tool(arguments)
     except ReplayError as error:
         print(f"replay {arguments.command}: {error}", file=sys.stderr)

@@ -123,6 +123,14 @@ class JointSettings(Setting):
     x_axis: Vector3 = Field(default=(1.0, 0.0, 0.0), description="Forward, of any length.")
     z_axis: Vector3 = Field(default=(0.0, 0.0, 1.0), description="Upward, of any length; made square to x_axis.")
 
+    @model_validator(mode="after")
+    def _two_directions(self) -> JointSettings:
+        (a, b, c), (u, v, w) = self.x_axis, self.z_axis
+        square = (b * w - c * v) ** 2 + (c * u - a * w) ** 2 + (a * v - b * u) ** 2
+        if not square > 1e-12 * (a * a + b * b + c * c) * (u * u + v * v + w * w):
+            refuse("x_axis and z_axis are parallel", "two directions", "turn one of them")
+        return self
+
 
 class StrapSettings(Setting):
     """A cable through nodes that pulls and never pushes."""

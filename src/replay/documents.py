@@ -24,6 +24,8 @@ from replay.files import read_text
 ModelT = TypeVar("ModelT", bound=BaseModel)
 Path_ = tuple[str | int, ...]
 
+LARGEST_SETTINGS = 100_000
+"""No settings file is longer; a table that is named in its place is not parsed for a minute."""
 _UNITS = (
     ("_m_per_s2", "m/s^2"),
     ("_m_per_s", "m/s"),
@@ -81,19 +83,21 @@ def load_yaml(path: Path, model: type[ModelT], *, context: Mapping[str, Any] | N
     InputError, InputErrors
         Syntax errors alone; otherwise every problem of the file at once, in file order.
     """
-    text = read_text(path)
+    text = _settings_text(path)
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
         lines, twice = _lines(root)
         data = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise _syntax(path, text, error) from None
+    except RecursionError:
+        raise _too_deep(path) from None
     return _validate(path, model, data, lines, twice, context)
 
 
 def load_json(path: Path, model: type[ModelT], *, context: Mapping[str, Any] | None = None) -> ModelT:
     """Read a JSON file into `model`; as `load_yaml`."""
-    text = read_text(path)
+    text = _settings_text(path)
     try:
         data = json.loads(text)
     except json.JSONDecodeError as error:
@@ -101,9 +105,29 @@ def load_json(path: Path, model: type[ModelT], *, context: Mapping[str, Any] | N
         raise InputError(
             path, f"is not JSON: {error.msg}", line=error.lineno, expected="one JSON object", mend=mend
         ) from None
+    except RecursionError:
+        raise _too_deep(path) from None
     # JSON is read a second time as YAML, only for the line of every key.
-    lines, twice = _lines(yaml.compose(text.replace("\t", " "), Loader=yaml.SafeLoader))
+    try:
+        lines, twice = _lines(yaml.compose(text.replace("\t", " "), Loader=yaml.SafeLoader))
+    except yaml.YAMLError as error:
+        raise _syntax(path, text, error) from None
+    except RecursionError:
+        raise _too_deep(path) from None
     return _validate(path, model, data, lines, twice, context)
+
+
+def _too_deep(path: Path) -> InputError:
+    return InputError(path, "nests brackets too deep to be read", mend="remove the brackets that are not closed")
+
+
+def _settings_text(path: Path) -> str:
+    text = read_text(path)
+    if len(text) > LARGEST_SETTINGS:
+        found = f"is {len(text)} characters long"
+        mend = "name the settings file, not a table or a mesh"
+        raise InputError(path, found, expected=f"settings, at most {LARGEST_SETTINGS} characters", mend=mend)
+    return text
 
 
 def _lines(root: yaml.Node | None) -> tuple[dict[Path_, int], list[tuple[Path_, int]]]:

@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 
 _MOST_LINES = 8
+_LONGEST_TEXT = 800
 
 
 class ReplayError(Exception):
@@ -49,8 +50,8 @@ class InputError(ReplayError):
         line: int | None = None,
         column: str | None = None,
     ) -> None:
-        self.file, self.found, self.expected, self.mend = str(file), found, expected, mend
-        self.line, self.column = line, column
+        self.file, self.found, self.expected, self.mend = str(file), _short(found), _short(expected), _short(mend)
+        self.line, self.column = line, column and _short(column)
         super().__init__(self._sentence())
 
     def _sentence(self) -> str:
@@ -63,6 +64,11 @@ class InputError(ReplayError):
         if self.mend:
             parts.append(f"mend: {self.mend}")
         return "\n    ".join(parts)
+
+
+def _short(text: str) -> str:
+    """A file that is spoilt may hold a cell of any length; a message repeats no more than can be read."""
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]} ... ({len(text)} characters)"
 
 
 class InputErrors(ReplayError):

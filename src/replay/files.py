@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import hashlib
 import json
 import math
@@ -15,16 +16,25 @@ import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from replay.errors import InputError, ReplayError
 
 _BLOCK = 1 << 20
+#: Name of the file that `hold_folder` locks.
+LOCK = ".lock"
 
 
 @contextlib.contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path, *, reserve_bytes: int = 0) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on a clean exit it becomes `path`, else it is removed.
+
+    Parameters
+    ----------
+    path
+        The file to write.
+    reserve_bytes
+        Room that the disk must have before anything is written: for libraries that do not survive a full one (HDF5).
 
     Raises
     ------
@@ -36,8 +46,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=path.suffix)
-        os.close(handle)
         temporary = Path(name)
+        try:
+            if reserve_bytes:
+                os.posix_fallocate(handle, 0, reserve_bytes)
+                os.ftruncate(handle, 0)
+        finally:
+            os.close(handle)
         yield temporary
         temporary.chmod(0o644)
         with temporary.open("rb+") as stream:
@@ -62,6 +77,30 @@ def _sync_folder(folder: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
+
+
+def hold_folder(folder: Path, doing: str) -> IO[str]:
+    """Make `folder` and keep every other process from writing there until the returned file is closed.
+
+    The kernel drops the lock of a process that dies.
+
+    Raises
+    ------
+    ReplayError
+        When another process holds it; a killed workflow can leave its solver running.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    held = (folder / LOCK).open("w")
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        held.close()
+        message = (
+            f"{folder}: another process is writing {doing}\n"
+            "    mend: wait for it, or end it (a killed workflow can leave its solver running)"
+        )
+        raise ReplayError(message) from None
+    return held
 
 
 def write_text(path: str | Path, text: str) -> None:

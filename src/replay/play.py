@@ -33,7 +33,7 @@ def _existing(name: str, info: ValidationInfo) -> str:
     refuse(
         "the file does not exist",
         f"a file in {Path(folder).resolve().name}/",
-        "correct the name, or put it beside play.yaml",
+        "correct the name, or put the file there",
     )
 
 
@@ -59,8 +59,36 @@ class ClicksSource(Setting):
     )
     clicks: InputFile = Field(
         default="kinovea_clicks.csv",
-        description="Clicks: frame, landmark_id, u_px, v_px (protocol 2.2).",
+        description="Tracks of the landmarks: the article's table (frame, landmark_id, u_px, v_px; protocol 2.2), or a "
+        "file of Kinovea, DeepLabCut or SLEAP.",
         validate_default=True,
+    )
+    format: Literal["auto", "clicks", "kva", "kinovea_xml", "kinovea_txt", "kinovea_csv", "deeplabcut", "sleap"] = (
+        Field(default="auto", description="Format of the tracks; `auto` tells it by the file's first lines.")
+    )
+    names: dict[str, str] = Field(
+        default_factory=dict,
+        description="Landmark of each track whose name in the file is another, `name in the file: landmark`.",
+        examples=[{"mask centre": "LM1"}],
+    )
+    ignore: tuple[str, ...] = Field(default=(), description="Tracks of the file that are no landmarks of this head.")
+    individual: str | None = Field(
+        default=None, description="Which individual (DeepLabCut) or track (SLEAP), where the file has several."
+    )
+    least_likelihood: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0.6, description="Predictions of DeepLabCut and SLEAP below this likelihood are left out."
+    )
+    origin_px: tuple[Number, Number] | None = Field(
+        default=None,
+        description="Where a Kinovea export (not a .kva) has its origin in the image [px]; default the image's centre.",
+    )
+    static_points: tuple[str, ...] = Field(
+        default=(),
+        description="Tracks of points that stand still in the scene: the camera's pan, tilt, roll and zoom are "
+        "estimated from them and removed.",
+    )
+    row_time_s: Annotated[Number, Field(ge=0, le=1e-4)] = Field(
+        default=0.0, description="Rolling shutter: time between the exposures of two image rows [s]; 0 is none."
     )
     landmarks: InputFile = Field(
         default="helmet_landmarks.csv",
@@ -313,7 +341,10 @@ class ModelChoice(Setting):
 class Hourglass(Setting):
     """Hourglass stabilisation, protocol 3.3.2."""
 
-    method: Literal["stiffness", "viscous"] = Field(default="stiffness", description="Form of the stabilisation.")
+    method: Literal["stiffness", "selective", "viscous"] = Field(
+        default="stiffness",
+        description="Form of the stabilisation; `selective` is a stiffness form that tells bending from twisting.",
+    )
     coefficient: Annotated[Number, Field(ge=0, le=0.3)] = Field(default=0.10, description="Coefficient.")
 
 
@@ -373,6 +404,11 @@ class Play(Setting):
         description="Limits this play sets itself, `gate.check: number` or `gate.check: {fail_above: number}`; "
         "a looser one is reported as loosened.",
     )
+    withhold: dict[str, str] = Field(
+        default_factory=dict,
+        description="Files of the play's folder whose bytes may not be shared, `video.mp4: why`: the bundle has "
+        "hash and reason instead.",
+    )
     _folder: Path = PrivateAttr(default=Path())
 
     @model_validator(mode="after")
@@ -405,6 +441,19 @@ class Play(Setting):
     def files(self) -> tuple[Path, ...]:
         """Every raw file the play names, in a fixed order."""
         return tuple(self.file(name) for name in self.source.files)
+
+    @field_validator("withhold")
+    @classmethod
+    def _are_there(cls, value: dict[str, str], info: ValidationInfo) -> dict[str, str]:
+        folder = (info.context or {}).get("folder")
+        for name, reason in value.items():
+            if not reason.strip():
+                refuse(
+                    f"{name} is withheld for no reason", "one clause that says why", "write the reason after the name"
+                )
+            if name == "play.yaml" or (folder is not None and not (Path(folder) / name).is_file()):
+                refuse(f"{name!r} cannot be withheld", "a file beside play.yaml", "correct the name")
+        return value
 
     @field_validator("name")
     @classmethod

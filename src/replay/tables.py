@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -122,7 +123,9 @@ class TableFormat:
         text = read_text(path)
         lines = text.split("\n")
         self._refuse_foreign_separator(path, lines)
-        rows = [(reader_line, row) for reader_line, row in _rows(text) if any(cell.strip() for cell in row)]
+        rows = [(reader_line, row) for reader_line, row in _rows(path, text) if any(cell.strip() for cell in row)]
+        if not rows:
+            raise InputError(path, "every cell is empty", expected=f"a {self.title}", mend="export the file again")
         header = [cell.strip() for cell in rows[0][1]]
         where = self._find_columns(path, rows[0][0], header)
         errors: list[InputError] = []
@@ -169,7 +172,7 @@ class TableFormat:
             )
 
     def _find_columns(self, path: str | Path, line: int, header: list[str]) -> dict[str, str]:
-        twice = sorted({h for h in header if h and header.count(h) > 1})
+        twice = sorted(h for h, count in Counter(header).items() if h and count > 1)
         if twice:
             raise InputError(path, f"the heading {twice[0]!r} occurs twice", line=line, mend="rename or remove one")
         where, missing = {}, []
@@ -190,12 +193,16 @@ class TableFormat:
         return where
 
 
-def _rows(text: str) -> list[tuple[int, list[str]]]:
+def _rows(path: str | Path, text: str) -> list[tuple[int, list[str]]]:
     reader = csv.reader(io.StringIO(text))
     out, start = [], 1
-    for row in reader:
-        out.append((start, row))
-        start = reader.line_num + 1
+    try:
+        for row in reader:
+            out.append((start, row))
+            start = reader.line_num + 1
+    except csv.Error as error:
+        mend = "close the quotation mark that opens in or before that line"
+        raise InputError(path, f"is no table of cells: {error}", line=start, mend=mend) from None
     return out
 
 

@@ -65,7 +65,13 @@ def fabricate(folder: Path, *, rejected: bool = False, shift: float = 0.0, log: 
     results = folder / "results" / "demo"
     numbers = np.random.default_rng(7).normal(size=(40, 2))
     tracks = {"clicks": "kinovea_clicks.csv", "landmarks": "helmet_landmarks.csv", "camera": "Config.json"}
-    play = {"name": "demo", "source": {"kind": "clicks", **tracks}, "model": {"preset": "nfl", "resolution": "tiny"}}
+    play = {
+        "name": "demo",
+        "source": {"kind": "clicks", **tracks},
+        "helmet": {"model": "classic", "mass_kg": 1.83},
+        "model": {"preset": "nfl", "resolution": "tiny"},
+        "gates": {},
+    }
     _stage(results, "settings", {"play.json": json.dumps(play).encode()})
     raw = {name: f"{name}\n1,2\n".encode() for name in tracks.values()}
     _stage(results, "inputs", raw, inputs=("settings/play.json",))
@@ -88,7 +94,23 @@ def fabricate(folder: Path, *, rejected: bool = False, shift: float = 0.0, log: 
     (results / "logs").mkdir()
     (results / "logs" / "impact.log").write_text(str(folder))
     status = "rejected" if rejected else "accepted"
-    verdict = {"play": "demo", "status": status, "line": f"demo: {status}"}
+    gates = {"reconstruction": "pass", "shake": "fail" if rejected else "pass"}
+    cause = {
+        "gate": "shake",
+        "check": "hourglass_ratio",
+        "verdict": "fail",
+        "sentence": "hourglass_ratio 0.2 (limit 0.1)",
+    }
+    verdict = {
+        "play": "demo",
+        "status": status,
+        "line": f"demo: {status}",
+        "gates": gates,
+        "stopped_by": "shake" if rejected else "",
+        "not_evaluated": [],
+        "causes": [cause] if rejected else [],
+        "loosened": [],
+    }
     _stage(results, "verdict", {"verdict.json": json.dumps(verdict).encode()}, inputs=("shake/gate.json",))
     return results
 
@@ -98,6 +120,7 @@ def fabricate_source(root: Path) -> Path:
     files = {
         "Snakefile": "rule all:\n    input: []\n",
         "environment.lock": "numpy==2.0.0\n",
+        "pyproject.toml": "[project]\n",
         "CITATION.cff": "cff-version: 1.2.0\n",
         "config/config.yaml": "plays: [demo]\n",
         "workflow/rules/replay.smk": "rule impact:\n    shell: 'replay impact'\n",

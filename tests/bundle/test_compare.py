@@ -14,6 +14,7 @@ import pytest
 
 from replay.bundle import compare, seal
 from replay.bundle.numbers import worst
+from replay.bundle.units import unit_of
 from replay.errors import BundleError, InputError
 from replay.manifest import Artifact, write_manifest
 
@@ -31,7 +32,7 @@ def test_two_equal_runs_are_identical_whatever_their_logs(tmp_path, sealed):
     assert by_path(result)["results/replay/run.log"].outcome == "not compared"
     assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "same"
     assert "README.md" in by_path(result)
-    assert result.text().startswith("the runs agree: ")
+    assert result.text() == "the runs agree: exact 33 same; tolerance 1 same; volatile 2 not compared"
 
 
 def test_a_difference_within_tolerance_agrees_but_is_not_identical(sealed):
@@ -64,6 +65,48 @@ def test_an_exact_artifact_may_not_differ_in_one_byte(tmp_path, sealed, source_r
     result = compare(sealed(), tmp_path / "demo.zip")
     assert by_path(result)["results/driver/driver_6dof.csv"].outcome == "differs"
     assert not result.agree
+
+
+def test_the_first_artifact_to_differ_is_the_one_where_the_runs_parted(tmp_path, sealed, source_root):
+    """Not the first by name (a deck) nor the one that is farthest off (a history), but the earliest in the workflow."""
+    results = fabricate(tmp_path, shift=1e3)
+    for stage, name, reads in (
+        ("driver", "driver_6dof.csv", "reconstruction/kinematics.csv"),
+        ("decks", "a.csv", "driver/driver_6dof.csv"),
+    ):
+        (results / stage / name).write_text("time_s,ax_m_per_s2\n0.0,1.25\n")
+        inputs = {reads: results / reads}
+        write_manifest(results / stage, stage=stage, play="demo", artifacts=[Artifact.exact(name, "x")], inputs=inputs)
+    seal(results, tmp_path / "demo.zip", source_root=source_root)
+    result = compare(sealed(), tmp_path / "demo.zip")
+    assert result.first.path == "results/driver/driver_6dof.csv"
+    assert (
+        "first to differ, in the order of the workflow:\n  results/driver/driver_6dof.csv (exact): differs"
+        in result.text()
+    )
+    assert by_path(result)["results/replay/histories.csv"].worst.absolute == pytest.approx(1e3)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("line 5, alpha_x_rad_per_s2", "rad/s^2"),
+        ("line 5, x_m", "m"),
+        ("line 5, time_s", "s"),
+        ("solver.plot_interval_s", "s"),
+        ("nodes/coordinates_m[3, 1]", "m"),
+        ("momentum_x_N_s", "N s"),
+        ("inertia_kg_m2", "kg m^2"),
+        ("checks[3].rmse_percent_of_peak", ""),
+        ("delta_peak_percent", "%"),
+        ("rate_hz", "Hz"),
+        ("solver.time_step_factor", ""),
+        ("m", ""),
+        ("frames_per_s", ""),
+    ],
+)
+def test_a_difference_carries_the_unit_of_its_name(name, unit):
+    assert unit_of(name) == unit
 
 
 def test_another_source_is_told_but_what_it_made_is_compared(tmp_path, sealed):
@@ -156,6 +199,35 @@ def test_arrays_are_compared_entry_by_entry():
     assert math.isnan(shape.absolute)
     missing = apart("a.h5", hdf(x=values), hdf(y=values))
     assert (missing.where, missing.old, missing.new) == ("group/x", "there", "missing")
+
+
+def test_large_datasets_are_compared_block_by_block_and_the_index_is_that_of_the_whole(monkeypatch):
+    monkeypatch.setattr("replay.bundle.numbers._BLOCK_VALUES", 30)
+    values = np.arange(300.0).reshape(100, 3)
+    other = values.copy()
+    other[77, 2] += 0.5
+    other[13, 0] += 0.25
+    found = apart("a.h5", hdf(x=values), hdf(x=other))
+    assert (found.where, found.absolute) == ("group/x[77, 2]", 0.5)
+    assert apart("a.h5", hdf(x=np.empty((0, 3))), hdf(x=np.empty((0, 3)))) is None
+    assert apart("a.h5", hdf(x=np.float64(1.0)), hdf(x=np.float64(2.0))).where == "group/x"
+
+
+def test_of_an_exact_table_the_worst_entry_is_the_one_farthest_off_beside_its_column():
+    """Not the first to differ, nor the greatest number: a pressure of 1e5 Pa that moves by 1 has hardly moved."""
+    old = b"time_s,p_Pa,x_m\n0,100000,0.001\n1,100000,0.002\n"
+    new = b"time_s,p_Pa,x_m\n0,100001,0.001\n1,100000,0.003\n"
+    assert apart("a.csv", old, new).where == "line 3, x_m"
+    assert apart(
+        "a.h5", hdf(p=np.full(3, 1e5), x=np.ones(3)), hdf(p=np.full(3, 1e5) + 1, x=np.ones(3) + 0.1)
+    ).where == ("group/x[0]")
+
+
+def test_texts_beside_numbers_are_compared_too():
+    names = np.array([b"brain", b"skull"])
+    assert apart("a.h5", hdf(n=names, x=np.ones(2)), hdf(n=names, x=np.ones(2))) is None
+    assert apart("a.h5", hdf(n=names), hdf(n=names[::-1])).where == "group/n"
+    assert apart("a.csv", b"part,x\nbrain,1\n", b"part,x\nskull,1\n").where == "line 2, part"
 
 
 def test_the_order_of_keys_is_part_of_a_json_file():

@@ -105,3 +105,18 @@ def test_the_crate_validates_against_its_profiles(tmp_path, shared, sealed, reje
         result = services.validate(settings)
         issues = [f"{issue.check.identifier}: {issue.message}" for issue in result.get_issues()]
         assert result.passed(), "\n".join(issues)
+
+
+@pytest.mark.parametrize("rejected", [False, True])
+def test_runcrate_reports_each_action_with_what_it_read_and_made(tmp_path, sealed, rejected):
+    tool = shutil.which("runcrate")
+    if tool is None:
+        pytest.skip("runcrate is not on this machine; it pins old versions of its thirty dependencies")
+    with zipfile.ZipFile(sealed(rejected=rejected) if rejected else sealed()) as archive:
+        archive.extractall(tmp_path)
+    done = subprocess.run([tool, "report", tmp_path / "demo/data"], capture_output=True, text=True, check=True)
+    blocks = {block.split("\n")[0]: block for block in done.stdout.split("action: ")[1:]}
+    assert {"#run-reconstruction", "#run-driver", "#run-shake", "#run-verdict"} <= set(blocks)
+    assert ("#run-replay" in blocks) is not rejected
+    assert "results/reconstruction/kinematics.csv" in blocks["#run-driver"].partition("outputs:")[0]
+    assert "results/driver/driver_6dof.csv" in blocks["#run-driver"].partition("outputs:")[2]

@@ -11,6 +11,7 @@ import tarfile
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from replay.bundle import package_facts, seal, verify
@@ -120,6 +121,40 @@ def test_actions_carry_what_was_read_and_made_and_when(sealed):
     assert entities["./"]["datePublished"] == "2023-11-14T22:16:00+00:00"
 
 
+def test_steps_stand_in_the_order_of_the_workflow_and_name_the_programs_they_stand_on(sealed):
+    entities = crate(sealed())
+    steps = {e["name"]: int(e["position"]) for e in entities.values() if e["@type"] == "HowToStep"}
+    chain = ["settings", "inputs", "reconstruction", "driver", "replay"]
+    assert sorted(chain, key=steps.get) == chain
+    assert steps["shake"] < steps["verdict"]
+    tool = entities["#stage-driver"]
+    programs = {entities[e["@id"]]["name"]: entities[e["@id"]]["softwareVersion"] for e in tool["softwareRequirements"]}
+    assert {"python", "numpy", "numba"} <= set(programs)
+    assert programs["numpy"] == np.__version__
+
+
+def test_the_readme_has_three_commands_and_the_way_without_the_program(sealed):
+    readme = payload(sealed())["README.md"].decode()
+    for command in ("verify demo.zip", "show demo.zip", "rerun demo.zip --into again"):
+        assert f"    replay {command}\n" in readme
+    assert "sha256sum --quiet -c manifest-sha256.txt" in readme
+    assert "make -C again run PLAY=demo RESOLUTION=tiny" in readme
+
+
+def test_an_interrupted_run_says_so_in_every_paper_whatever_an_older_verdict_said(tmp_path, source_root):
+    results = fabricate(tmp_path)
+    (results / "replay" / "manifest.json").unlink()
+    seal(results, tmp_path / "demo.zip", source_root=source_root, unfinished=["replay", "fidelity"])
+    assert verify(tmp_path / "demo.zip").verdict == "INTERRUPTED"
+    files = payload(tmp_path / "demo.zip")
+    assert b"the run ended before replay, fidelity; nothing was judged" in files["README.md"]
+    whole = crate(tmp_path / "demo.zip")["#run"]
+    assert whole["actionStatus"].endswith("FailedActionStatus")
+    assert "ended before replay, fidelity" in whole["error"]
+    with zipfile.ZipFile(tmp_path / "demo.zip") as archive:
+        assert b"Replay-Verdict: INTERRUPTED\n" in archive.read("demo/bag-info.txt")
+
+
 def test_a_file_that_changed_since_its_stage_is_not_sealed(tmp_path, source_root):
     results = fabricate(tmp_path)
     (results / "driver" / "driver_6dof.csv").write_text("time_s,x_m\n0.0,9.0\n")
@@ -145,10 +180,35 @@ def test_what_may_not_be_shared_goes_in_by_hash_and_reason(tmp_path, source_root
     assert left["plays/demo/video.mp4"]["sha256"] == hashlib.sha256(b"frames").hexdigest()
     assert left["results/inputs/kinovea_clicks.csv"]["reason"] == "not ours"
     assert facts["minimum_package"]["kinovea_clicks.csv"] == {"present": True, "hashed": True}
+    row = f"| `plays/demo/video.mp4` | belongs to the league | `{hashlib.sha256(b'frames').hexdigest()}` |"
+    assert row in files["README.md"].decode()
     with pytest.raises(InputError, match="is no artifact"):
         seal(results, tmp_path / "b.zip", source_root=source_root, withhold={"results/none.csv": "x"})
     with pytest.raises(InputError, match="to withhold"):
         seal(results, tmp_path / "b.zip", source_root=source_root, play_folder=play, withhold={"plays/demo/no": "x"})
+
+
+@pytest.mark.parametrize("git", [False, True])
+def test_what_is_withheld_is_not_smuggled_out_by_the_source_snapshot(tmp_path, git):
+    """Plays lie in the checkout: the film is in the source tree, and in the difference to its commit."""
+    root = fabricate_source(tmp_path / "source")
+    play = root / "config/plays/demo"
+    play.mkdir(parents=True)
+    (play / "play.yaml").write_text("name: demo\n")
+    (play / "video.mp4").write_bytes(b"an older film")
+    if git:
+        commit(root)
+    film = b"every frame of the league's film"
+    (play / "video.mp4").write_bytes(film)
+    (root / "src/copy.mp4").write_bytes(film)
+    withhold = {"plays/demo/video.mp4": "belongs to the league"}
+    path = tmp_path / "demo.zip"
+    seal(fabricate(tmp_path), path, source_root=root, play_folder=play, withhold=withhold)
+    files = payload(path)
+    assert not [name for name, data in files.items() if film in data]
+    assert b"video.mp4" not in files["source/dirty.diff"]
+    told = json.loads(files["source/source.json"])["withheld"]
+    assert told == ["config/plays/demo/video.mp4", "src/copy.mp4"]
 
 
 def test_extra_files_go_in_but_take_no_other_place(tmp_path, source_root):

@@ -65,7 +65,7 @@ def test_every_single_byte_change_is_caught_and_its_file_named(tmp_path, sealed)
         for entry in archive.entries.values():
             structure += range(entry.offset, entry.offset + len(entry.local_header()))
     structure += range(next(at for at, _ in starts[len(starts) // 2 :]), length)
-    places = [*draw.integers(0, length, 150), *draw.choice(structure, 150), length - 1, 0]
+    places = [*draw.integers(0, length, 500), *draw.choice(structure, 500), length - 1, 0]
     copy = tmp_path / "demo.zip"
     for place in places:
         flip(path, copy, int(place), int(draw.integers(1, 256)))
@@ -137,6 +137,8 @@ DRIVER = "data/results/driver/driver_6dof.csv"
         (lambda f: f.pop(DRIVER), f"{DRIVER}: is missing, but manifest-sha256.txt lists it"),
         (lambda f: f.update({"data/extra.txt": b"x"}), "data/extra.txt: was not sealed here"),
         (lambda f: f.update({"extra.txt": b"x"}), "extra.txt: was not sealed here: no manifest lists it"),
+        (lambda f: f.update({"fetch.txt": b"http://example.org/x - data/x\n"}), "fetch.txt: was not sealed here"),
+        (edit("manifest-sha256.txt", b"data/README.md", b"../../etc/passwd"), "changed since|does not list"),
         (lambda f: f.update({DRIVER: b"another"}), f"{DRIVER}: changed since it was sealed: its sha256"),
         (lambda f: f.pop("bagit.txt"), "bagit.txt: is missing"),
         (lambda f: f.pop("manifest-sha512.txt"), "manifest-sha512.txt: is missing"),

@@ -11,6 +11,7 @@ from replay.gates import (
     Gate,
     Limits,
     PartEnergy,
+    agreement_gate,
     assembly_gate,
     fidelity_gate,
     helmet_gate,
@@ -142,9 +143,31 @@ GOOD_FIDELITY = {
     for quantity in ("linear_acceleration", "angular_acceleration", "angular_velocity")
 } | {"position_residual_mm": 1e-4, "rotation_residual_deg": 1e-4}
 
+GOOD_AGREEMENT: dict[str, Any] = {
+    "same_video": True,
+    "frame_rate_difference_percent": 0.0,
+    "template_scale_percent": 0.3,
+    "template_residual_mm": 1.2,
+    "helmet_to_com_difference_mm": 1.0,
+    "same_filters": True,
+    "t0_difference_samples": 0.0,
+    "along_ray_over_noise": 0.6,
+    "velocity_difference_m_per_s": 0.05,
+    "spin_difference_rad_per_s": 0.4,
+}
+GOOD_QUANTITIES: dict[str, dict[str, Any]] = {
+    "angular velocity": {
+        "rmse_percent_of_peak": 1.2,
+        "delta_peak_percent": 0.4,
+        "time_to_peak_difference_samples": 0.1,
+        "iso_18571_rating": 0.98,
+    }
+}
+GOOD_LABORATORIES: dict[str, dict[str, Any]] = {"north": {"own_gates_passed": True, "limits_as_shipped": True}}
+
 
 def all_gates(limits: Limits) -> dict[str, Gate]:
-    """Every gate of a flawless play whose model has contact."""
+    """Every gate of a flawless play whose model has contact, and that of two laboratories which agree on it."""
     builders: dict[str, Callable[[], Gate]] = {
         "helmet": lambda: helmet_gate(GOOD["helmet"], limits),
         "reconstruction": lambda: video_reconstruction_gate(GOOD["video"], limits),
@@ -156,6 +179,7 @@ def all_gates(limits: Limits) -> dict[str, Gate]:
         "hourglass_sensitivity": lambda: hourglass_sensitivity_gate(GOOD_REGIONS, limits),
         "fidelity": lambda: fidelity_gate(GOOD_FIDELITY, limits),
         "package": lambda: package_gate(dict.fromkeys(VIDEO_PACKAGE, (True, True)), limits),
+        "agreement": lambda: agreement_gate(GOOD_AGREEMENT, GOOD_QUANTITIES, GOOD_LABORATORIES, limits),
     }
     return {name: build() for name, build in builders.items()}
 

@@ -15,6 +15,7 @@ from replay.gates import (
     Gate,
     Limits,
     PartEnergy,
+    agreement_gate,
     assembly_gate,
     fidelity_gate,
     helmet_gate,
@@ -79,9 +80,24 @@ def gate_with(name: str, value: float | bool, limits: Limits) -> Gate:
         else:
             fidelity["angular_velocity"][check] = value
         return fidelity_gate(fidelity, limits)
+    if gate == "agreement":
+        return agreement_with(check, value, limits)
     items = dict.fromkeys(VIDEO_PACKAGE, (True, True))
     items["kinematics.csv"] = (False, False) if check == "present" else (True, False)
     return package_gate(items, limits)
+
+
+def agreement_with(check: str, value: float | bool, limits: Limits) -> Gate:
+    values, quantities, laboratories = (
+        copy.deepcopy(good) for good in (flawless.GOOD_AGREEMENT, flawless.GOOD_QUANTITIES, flawless.GOOD_LABORATORIES)
+    )
+    if check in values:
+        values[check] = value
+    elif check in quantities["angular velocity"]:
+        quantities["angular velocity"][check] = value
+    else:
+        laboratories["north"][check] = value
+    return agreement_gate(values, quantities, laboratories, limits)
 
 
 def numerics_with(check: str, value: float | bool, limits: Limits) -> Gate:

@@ -7,13 +7,14 @@ import pandas as pd
 import pytest
 
 from replay.motion import Impact, check_tracks, reconstruct
+from replay.motion.clip import load_clip
 from replay.motion.null import click_noise
 from replay.motion.protocol import reconstruct_clicks
 from replay.motion.reconstruct import INITIAL_CONDITIONS, POSES, QC
-from replay.motion.settings import CameraSettings, load_camera
+from replay.motion.settings import CameraSettings
 from replay.motion.synthetic import ARTICLE_OFFSET_M, HEAD_SIZED_OFFSET_M, LANDMARKS, SyntheticCamera
-from replay.motion.tracks import Template, Tracks, read_clicks, read_template
-from replay.play import load_play
+from replay.motion.tracks import Template, Tracks
+from replay.play import ClicksSource, load_play
 
 POINTS = np.array(list(LANDMARKS.values()))
 CAMERA = SyntheticCamera(239.76, -24, 26, (3840, 2160), 3840.0)
@@ -58,8 +59,10 @@ def test_acceleration_of_the_cg_agrees_with_that_carried_from_the_template():
 
 def test_one_hidden_frame_is_bridged_and_said(repository):
     folder = repository / "config" / "plays" / "demo"
-    camera, template = load_camera(folder / "Config.json"), read_template(folder / "helmet_landmarks.csv")
-    tracks = read_clicks(folder / "kinovea_clicks.csv", template, camera.size)
+    play = load_play(folder)
+    assert isinstance(play.source, ClicksSource)
+    clip = load_clip(play, play.source)
+    camera, template, tracks = clip.camera, clip.template, clip.tracks
     pixels = tracks.pixels.copy()
     pixels[30] = np.nan
     pixels[10, 3:] = np.nan
@@ -162,8 +165,10 @@ def test_linear_reference_is_a_setting(demo, repository, tmp_path):
 
 def test_click_noise_is_measured_where_there_are_degrees_of_freedom(repository):
     folder = repository / "config" / "plays" / "demo"
-    camera, template = load_camera(folder / "Config.json"), read_template(folder / "helmet_landmarks.csv")
-    tracks = read_clicks(folder / "kinovea_clicks.csv", template, camera.size)
+    play = load_play(folder)
+    assert isinstance(play.source, ClicksSource)
+    clip = load_clip(play, play.source)
+    camera, template, tracks = clip.camera, clip.template, clip.tracks
     sigma, measured = click_noise(reconstruct_clicks(tracks, template, camera), camera, tracks)
     assert measured
     assert sigma == pytest.approx(1.0, rel=0.15)

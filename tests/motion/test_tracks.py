@@ -3,8 +3,9 @@
 import pytest
 
 from replay.errors import InputError, InputErrors
+from replay.motion.readers import Context, read_tracks
 from replay.motion.settings import load_camera
-from replay.motion.tracks import read_clicks, read_template
+from replay.motion.tracks import read_template
 
 SIZE = (1280.0, 720.0)
 TEMPLATE = "landmark,X,Y,Z\nLM1,0.185,0,-0.045\nLM2,0.135,0.095,-0.05\nLM3,0.135,-0.095,-0.05\nLM4,0.145,0,0.085\n"
@@ -25,7 +26,8 @@ def files(tmp_path):
 
 
 def read(files):
-    return read_clicks(files / "kinovea_clicks.csv", read_template(files / "helmet_landmarks.csv"), SIZE)
+    template = read_template(files / "helmet_landmarks.csv")
+    return read_tracks(files / "kinovea_clicks.csv", template, Context(59.94, SIZE)).tracks
 
 
 def message(files):
@@ -150,3 +152,25 @@ def test_bad_camera_files_are_named_by_line(tmp_path, old, new, expected):
         load_camera(path)
     for part in expected:
         assert part in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (CONFIG.replace("59.94", "59.94" + " " * 200_000), "is 200"),
+        ("[" * 50_000, "nests brackets too deep"),
+        ('{"a": ' + "[" * 400 + "]" * 400 + "}", "Config.json"),
+        (CONFIG.replace('"fps"', '"f\x80ps"'), "Config.json"),
+    ],
+)
+def test_a_camera_file_that_is_none_is_told_at_once(tmp_path, text, expected):
+    path = tmp_path / "Config.json"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises((InputError, InputErrors), match=expected):
+        load_camera(path)
+
+
+def test_a_message_does_not_repeat_a_spoilt_file(files):
+    path = files / "kinovea_clicks.csv"
+    path.write_text(path.read_text().replace("0,LM1", "0," + "LM1" * 5000, 1))
+    assert len(message(files)) < 3000

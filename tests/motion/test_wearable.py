@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from replay.errors import InputError, InputErrors
-from replay.motion import Kinematics, build_driver, check_tracks, reconstruct
+from replay.motion import Impact, Kinematics, build_driver, check_tracks, reconstruct
 from replay.motion.kinematics import STANDARD_GRAVITY
 from replay.play import Window, load_play
 
@@ -48,6 +48,38 @@ def test_files_and_driver_of_a_wearable_are_those_of_any_play(repository, tmp_pa
     driver = build_driver(again, result.t0_s, result.play.window)
     assert driver.quality.closure_position_mm < 0.01
     assert driver.quality.closure_rotation_deg < 0.05
+
+
+def test_a_headform_at_its_cg_in_j211_axes_gives_the_motion_it_had(tmp_path):
+    truth = Impact().at(np.arange(-400, 601) / 10000.0)
+    # x forward, y right, z down; a headform measures at its CG, here with its own angular acceleration and a class
+    sae = np.array([1.0, -1.0, -1.0])
+    vectors = (truth.acceleration_m_per_s2 / STANDARD_GRAVITY, truth.omega_rad_per_s, truth.alpha_rad_per_s2)
+    table = np.hstack([truth.time_s[:, None] + 0.04, *(truth.in_head_axes(v) * sae for v in vectors)])
+    names = ["Time (s)", *(f"{what} {axis}" for what in ("Acc (g)", "Rate (rad/s)", "AngAcc") for axis in "XYZ")]
+    rows = [",".join(f"{value:.9g}" for value in row) for row in table]
+    folder = tmp_path / "headform"
+    folder.mkdir()
+    (folder / "wearable.csv").write_text("\n".join([",".join(names), *rows]) + "\n")
+    (folder / "play.yaml").write_text(HEADFORM)
+    k = reconstruct(load_play(folder)).kinematics
+    for name in ("acceleration_m_per_s2", "omega_rad_per_s", "alpha_rad_per_s2"):
+        own, true = (motion.in_head_axes(getattr(motion, name)) for motion in (k, truth))
+        assert np.abs(own - true).max() < 0.02 * np.abs(true).max()
+
+
+HEADFORM = """name: headform
+source:
+  kind: wearable
+  columns:
+    time: {name: Time (s), unit: s}
+    acceleration: {names: [Acc (g) X, Acc (g) Y, Acc (g) Z], unit: g}
+    angular_velocity: {names: [Rate (rad/s) X, Rate (rad/s) Y, Rate (rad/s) Z], unit: rad/s}
+    angular_acceleration: {names: [AngAcc X, AngAcc Y, AngAcc Z], unit: rad/s^2}
+  axes: sae_j211
+  sensor_to_cg_m: [0, 0, 0]
+  filter: {kind: cfc, channel_class: 1000}
+"""
 
 
 def test_gravity_is_taken_out_where_the_play_says_it_is_in(wearable):

@@ -15,7 +15,8 @@ from replay.solver.mortar import outer_faces, tie_surfaces
 from replay.solver.rigid import rotation
 
 BONE = Material("bone", "rigid", 2000.0, {})
-RUBBER = Material("rubber", "elastic", 1000.0, {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.25})
+MODULUS = 1e6
+RUBBER = Material("rubber", "elastic", 1000.0, {"youngs_modulus_pa": MODULUS, "poisson_ratio": 0.25})
 STILL = Controls(0.02, mass_scaling_time_step_s=0.0, bulk_viscosity_linear=0.0, bulk_viscosity_quadratic=0.0)
 
 
@@ -49,11 +50,11 @@ def momenta(run: Integrator) -> np.ndarray:
 
 def stacked(
     below: tuple[int, int] = (2, 3), above: tuple[int, int] = (3, 4), *, crooked: float = 0.0, offset: float = 0.0,
-    tied: str = "above", **fields: Any,
+    tied: str = "above", layers: int = 2, **fields: Any,
 ) -> Problem:  # fmt: skip
     """Two blocks of 20 mm a side on one another, with other meshes on the two sides of the plane z = 10 mm."""
-    nodes, hexes = structured_block((*below, 2), (0.02, 0.02, 0.01))
-    upper, more = structured_block((*above, 2), (0.02, 0.02, 0.01), (offset, 0.0, 0.01))
+    nodes, hexes = structured_block((*below, layers), (0.02, 0.02, 0.01))
+    upper, more = structured_block((*above, layers), (0.02, 0.02, 0.01), (offset, 0.0, 0.01))
     first = len(nodes)
     nodes = np.concatenate([nodes, upper])
     inner = ((nodes[:, :2] > 1e-9) & (nodes[:, :2] < 0.02 - 1e-9)).all(axis=1)

@@ -38,7 +38,7 @@ class Point:
         self.work = 0.0
 
     def to(self, f: Any, dt: float = 1e-4) -> np.ndarray:
-        f = np.asarray(f, float)
+        f = np.array(f, float)
         middle = 0.5 * (f + self.f)
         gradient = (f - self.f) @ np.linalg.inv(middle)
         rate, spin = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)

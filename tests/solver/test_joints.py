@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import pairwise
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from linked import BONE, STILL, momenta, two_bricks
 from scipy.spatial.transform import Rotation
+from scipy.special import ellipk
 
 from replay.errors import InputError, InstabilityError
 from replay.solver import Controls, Joint, Material, Problem, SolverPart, solve
@@ -101,6 +103,35 @@ def test_a_head_on_a_neck_swings_at_its_frequency(axis: int, column: int) -> Non
     k = int(np.argmax(np.sign(rows[1:]) != np.sign(rows[1])))
     crossing = dt * (k + 1 - rows[k + 1] / (rows[k + 1] - rows[k]))
     assert crossing == pytest.approx(half, rel=2e-4)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 1.2])
+def test_a_pendulum_swings_with_its_elliptic_period(amplitude: float) -> None:
+    # a brick hung by the middle of its top; gravity is aslant, so that it starts at rest off its equilibrium
+    nodes, hexes = structured_block((2, 2, 2), (0.05, 0.04, 0.03))
+    pivot = np.array([0.025, 0.02, 0.03])
+    g = 9.81 * np.array([np.sin(amplitude), 0.0, -np.cos(amplitude)])
+    problem = Problem(
+        nodes, hexes, np.zeros(8, int), (SolverPart(2, "bob", BONE),),
+        dataclasses.replace(STILL, gravity_m_per_s2=tuple(g)),
+        joints=[joined(first=None, centre=pivot, stiffness=np.zeros((3, 2)), centre_stiffness=1e6)],
+    )  # fmt: skip
+    run = Integrator(problem, 1e9)
+    arm = 0.015
+    inertia = 1.0 / run.bodies.inverse_inertia[0][1, 1] + run.bodies.mass[0] * arm**2
+    quarter = np.sqrt(inertia / (run.bodies.mass[0] * 9.81 * arm)) * ellipk(np.sin(amplitude / 2) ** 2)
+    dt = quarter / 4000
+    swing = []
+    for _ in range(8400):
+        run.forces()
+        swing.append(run.links.joint_rows[0, 1])
+        run.kick(dt, drift=False)
+        energies = run.energies()
+        run.drift(dt, run.time_s + dt)
+    # from rest to rest at the other side: half a period
+    assert abs(energies.closure) < 1e-10
+    assert dt * int(np.argmax(np.abs(swing))) == pytest.approx(2 * quarter, rel=2e-3)
+    assert np.abs(swing).max() == pytest.approx(2 * amplitude, rel=1e-3)
 
 
 @pytest.mark.parametrize("ratio", [0.1, 0.5])

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from linked import everything
 from numba.core import config
 
 from replay.solver import Problem
@@ -34,8 +35,11 @@ print(state_hash(run))
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="there is nothing to compare without the compiler")
-def test_all_laws_give_the_same_bits_without_the_compiler(layered: Callable[..., Problem], tmp_path: Path) -> None:
-    problem = layered(end=1e-3, counts=(12, 1, 1))
+@pytest.mark.parametrize("kind", ["all laws", "joints, straps and ties"])
+def test_all_laws_and_links_give_the_same_bits_without_the_compiler(
+    layered: Callable[..., Problem], tmp_path: Path, kind: str
+) -> None:
+    problem = layered(end=1e-3, counts=(12, 1, 1)) if kind == "all laws" else everything()
     run = Integrator(problem, 1e9)
     for _ in range(_STEPS):
         dt = 0.9 * run.forces().step_s

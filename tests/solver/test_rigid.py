@@ -174,6 +174,28 @@ def test_free_body_with_soft_parts_keeps_momentum_angular_momentum_and_energy() 
     assert 0.9999 < energies.ratio < 1.0001
 
 
+def test_a_spinning_body_falls_freely_and_its_weight_does_the_work() -> None:
+    nodes, hexes = structured_block((2, 2, 1), (0.06, 0.04, 0.01))
+    g = np.array([0.5, -1.0, -9.81])
+    omega, start = np.array([5.0, 60.0, -20.0]), np.array([1.0, 2.0, 3.0])
+    problem = Problem(
+        nodes, hexes, np.zeros(4, int), (SolverPart(1, "brick", BONE),), Controls(1.0, gravity_m_per_s2=tuple(g)),
+        initial_velocity=start + np.cross(omega, nodes - nodes.mean(axis=0)),
+    )  # fmt: skip
+    run = Integrator(problem, 1e9)
+    for _ in range(1000):
+        run.kick(1e-4, drift=False)
+        energies = run.energies()
+        run.drift(1e-4, run.time_s + 1e-4)
+    t = run.time_s
+    fall = run.bodies.centre[0] - nodes.mean(axis=0)
+    assert np.allclose(fall, start * t + 0.5 * g * t * t, rtol=1e-12)
+    assert abs(energies.closure) < 1e-12
+    assert energies.external_work == pytest.approx(
+        run.bodies.mass[0] * g @ (fall - run.bodies.velocity[0] * 1e-4), rel=1e-3
+    )
+
+
 def test_pose_is_read_off_the_nodes() -> None:
     rng = np.random.default_rng(1)
     lever, mass = rng.normal(size=(20, 3)), rng.uniform(1, 2, 20)

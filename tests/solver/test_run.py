@@ -8,6 +8,7 @@ import io
 import json
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -22,6 +23,7 @@ import pytest
 from linked import everything
 from scipy.spatial.transform import Rotation
 
+import replay.solver.progress as progress_module
 import replay.solver.run as run_module
 from replay.errors import ReplayError, ResumeError
 from replay.solver import (
@@ -328,6 +330,19 @@ def test_anything_that_changes_the_result_changes_the_models_hash(layered: Layer
     assert layered().digest() == plain.digest()
 
 
+def test_what_a_killed_writer_left_is_cleared_away(layered: Layered, tmp_path: Path) -> None:
+    store = Checkpoints(tmp_path / "checkpoint", identity(layered(end=1e-3)))
+    for end in ("write", "clear"):
+        store.write(1, {"a": np.ones(5)})
+        (tmp_path / "checkpoint" / ".step-000000000002.checkpoint.x1y2.checkpoint").write_bytes(b"half a fi")
+        if end == "write":
+            store.write(3, {"a": np.ones(5)})
+            assert len(list((tmp_path / "checkpoint").iterdir())) == 2
+        else:
+            store.clear()
+            assert not (tmp_path / "checkpoint").exists()
+
+
 def test_a_damaged_checkpoint_falls_back_to_the_one_before(layered: Layered, tmp_path: Path) -> None:
     problem = layered(end=1e-3)
     store = Checkpoints(tmp_path, identity(problem))
@@ -355,6 +370,31 @@ def test_progress_speaks_before_the_start_and_then_rarely(layered: Layered, tmp_
     assert "elements that deform" in lines[0]
     assert "MiB" in lines[0]
     assert "steps of" in lines[0]
+
+
+def test_a_progress_line_says_where_the_run_is_and_comes_every_five_seconds_at_most(
+    layered: Layered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(np.arange(0.0, 1e4, 0.5))
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: float(next(clock)))
+    note = io.StringIO()
+    run = Integrator(layered(end=2e-3), 1e9)
+    progress = progress_module.Progress(note, 2e-3)
+    bound = run.forces()
+    progress.estimate(run, bound)
+    for _ in range(16 * 25):
+        dt = 0.4 * run.forces().step_s
+        run.kick(dt, drift=True)
+        run.drift(dt, run.time_s + dt)
+        progress.step(run, bound)
+    lines = note.getvalue().splitlines()[1:]
+    # 25 looks at the clock, half a second apart
+    assert len(lines) == 2
+    holder = f"by element {bound.element + 1} ({run.problem.part_of(bound.element).name})"
+    for line in lines:
+        assert re.search(r"\d+\.\d %  t \d\.\d+ ms  dt \S+ s", line), line
+        assert holder in line
+        assert re.search(r"energy ratio [01]\.\d+  \d+ (s|min) left", line), line
 
 
 def test_outputs_fall_on_their_times_to_the_last_bit(layered: Layered, tmp_path: Path) -> None:

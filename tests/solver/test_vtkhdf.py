@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-from replay.errors import InputError, ResumeError
+from replay.errors import InputError, ReplayError, ResumeError
 from replay.solver.vtkhdf import StatesWriter, read_states
 
 NODES = np.array([[i, j, k] for k in (0, 1) for j in (0, 1) for i in (0, 1, 2)], float) * 0.01
@@ -212,6 +213,23 @@ def test_xdmf_twin_refers_to_the_same_numbers(tmp_path):
                 np.testing.assert_array_equal(resolve(source)[window], states.field(name, index))
 
 
+def test_a_disk_too_full_for_the_file_is_told_before_hdf5_meets_it(tmp_path, monkeypatch):
+    # HDF5 crashes the process on a full disk
+    def full(handle: int, start: int, size: int) -> None:
+        assert size > states.partial_path.stat().st_size
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    states = writer(tmp_path)
+    states.append(*state(0))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "posix_fallocate", full)
+        with pytest.raises(ReplayError, match=r"states.vtkhdf: cannot be written \(No space left on device\)"):
+            states.close()
+    assert [p.name for p in tmp_path.iterdir()] == ["states.partial"]
+    states.close()
+    assert complete(tmp_path / "whole", 1).read_bytes() == (tmp_path / "states.vtkhdf").read_bytes()
+
+
 def test_vtk_opens_the_states_with_times_and_values(tmp_path):
     pytest.importorskip("vtk", reason="VTK is an extra (pip install 'replay-impact[vtk]'): its reader is not here")
     from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -234,3 +252,28 @@ def test_vtk_opens_the_states_with_times_and_values(tmp_path):
         np.testing.assert_array_equal(displacement, expected["displacement_m"].astype("f4"))
         np.testing.assert_array_equal(vtk_to_numpy(grid.GetCellData().GetArray("element_pid")), [1, 4])
         np.testing.assert_array_equal(vtk_to_numpy(grid.GetPointData().GetArray("node_ids")), np.arange(12) + 101)
+
+
+def test_vtk_opens_the_xdmf_twin_with_the_same_values(tmp_path):
+    pytest.importorskip("vtk", reason="VTK is an extra (pip install 'replay-impact[vtk]'): its reader is not here")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+    reader = vtkXdmfReader()
+    reader.SetFileName(str(complete(tmp_path).with_suffix(".xdmf")))
+    reader.UpdateInformation()
+    times = reader.GetOutputInformation(0).Get(reader.GetExecutive().TIME_STEPS())
+    assert np.allclose(times, np.arange(5) * 1e-3)
+    for index in (0, 4):
+        reader.UpdateTimeStep(times[index])
+        grid = reader.GetOutputDataObject(0)
+        if grid.IsA("vtkMultiBlockDataSet"):
+            grid = grid.GetBlock(0)
+        np.testing.assert_array_equal(vtk_to_numpy(grid.GetPoints().GetData()).astype(float), NODES)
+        expected = state(index)[1]
+        np.testing.assert_array_equal(
+            vtk_to_numpy(grid.GetCellData().GetArray("von_mises_Pa")), expected["von_mises_Pa"].astype("f4")
+        )
+        np.testing.assert_array_equal(
+            vtk_to_numpy(grid.GetPointData().GetArray("displacement_m")), expected["displacement_m"].astype("f4")
+        )

@@ -21,8 +21,10 @@ from replay.cli import main
 from replay.controls import SolveControls
 from replay.documents import Setting
 from replay.errors import InputError
+from replay.files import hold_folder
 from replay.models import Model, Part, build_model, write_model
 from replay.solver.blocks import structured_block
+from replay.solver.checkpoint import Checkpoints
 from replay.stages.solver_model import open_model
 
 WRITE = os.environ.get("REPLAY_WRITE_DOCS") == "1"
@@ -123,7 +125,7 @@ def test_two_blocks_run_with_a_tie_a_joint_and_a_rigid_set(
 ) -> None:
     out = tmp_path / "out"
     assert main(["solve", str(two_blocks), "--controls", written(tmp_path), "--out", str(out)]) == 0
-    assert "tie seam: 12 nodes tied, moved by up to 0.5 mm" in capsys.readouterr().out
+    assert "tie seam: 12 nodes tied, moved by up to 0.5 mm\n" in capsys.readouterr().out
     energy = pd.read_csv(out / "energy.csv")
     assert energy["closure"].abs().max() < 1e-10
     assert energy["time_s"].iloc[-1] == 2e-3
@@ -164,9 +166,13 @@ def test_every_name_that_is_not_there_is_told_at_once(
             "two points that span the axis",
         ),
         ({"joints": [{"name": "j", "second": 20}]}, "is missing"),
+        ({"joints": [{**BLOCKS["joints"][0], "x_axis": [0, 0, 2]}]}, "x_axis and z_axis are parallel"),
         ({"supports": [{"axes": ["x"]}]}, "names its nodes in no way"),
         ({"prescribed_motions": [{"parts": [10], "file": "m.csv"}]}, "the file does not exist"),
-        ({"joints": [{**BLOCKS["joints"][0], "second": 20}]}, "20 is no rigid part and no rigid set"),
+        (
+            {"joints": [{**BLOCKS["joints"][0], "second": 20}]},
+            "controls.yaml: joints.hinge.second: 20 is no rigid part and no rigid set",
+        ),
         (
             {"materials": [{"parts": [20], "law": "elastik", "density_kg_per_m3": 1e3}]},
             "did you mean 'elastic'",
@@ -203,33 +209,39 @@ _CHILD = "import sys; from replay.cli import main; sys.exit(main(sys.argv[1:]))"
 
 def test_after_ctrl_c_the_same_command_goes_on(two_blocks: Path, tmp_path: Path) -> None:
     controls = written(tmp_path, termination_time_s=0.1)
-    command = [
-        sys.executable,
-        "-c",
-        _CHILD,
-        "solve",
-        str(two_blocks),
-        "--controls",
-        controls,
-        "--threads",
-        "1",
-        "--out",
-    ]
-    child = subprocess.Popen([*command, str(tmp_path / "out")], stderr=subprocess.PIPE, text=True)
+    command = ["solve", str(two_blocks), "--controls", controls, "--threads", "1", "--out"]
+    child = subprocess.Popen(
+        [sys.executable, "-c", _CHILD, *command, str(tmp_path / "out")], stderr=subprocess.PIPE, text=True
+    )
     deadline = time.monotonic() + 120
     while not (tmp_path / "out" / "states.partial").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
-    time.sleep(0.1)
     child.send_signal(signal.SIGINT)
-    _, text = child.communicate(timeout=60)
+    _, text = child.communicate(timeout=120)
     assert child.returncode == 130, text
     assert "state saved" in text
     assert "Traceback" not in text
-    again = subprocess.run([*command, str(tmp_path / "out")], capture_output=True, text=True, check=True)
-    assert "goes on from" in again.stderr
-    subprocess.run([*command, str(tmp_path / "whole")], capture_output=True, check=True)
+    assert len(list((tmp_path / "out" / "checkpoint").iterdir())) == 1
+    assert main([*command, str(tmp_path / "out")]) == 0
+    assert main([*command, str(tmp_path / "whole")]) == 0
     for path in sorted((tmp_path / "whole").iterdir()):
         assert path.read_bytes() == (tmp_path / "out" / path.name).read_bytes(), path.name
+
+
+def test_two_runs_do_not_write_one_folder(two_blocks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with hold_folder(tmp_path / "out", "this run"):
+        assert main(["solve", str(two_blocks), "--controls", written(tmp_path), "--out", str(tmp_path / "out")]) == 1
+    assert "another process is writing this run" in capsys.readouterr().err
+
+
+def test_a_checkpoint_of_other_controls_is_refused_unless_told(
+    two_blocks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["solve", str(two_blocks), "--controls", written(tmp_path), "--out", str(tmp_path / "out")]
+    Checkpoints(tmp_path / "out" / "checkpoint", {"version": "0", "code": "0", "model": "0"}).write(1, {})
+    assert main(command) == 2
+    assert "was written by another version of replay" in capsys.readouterr().err
+    assert main([*command, "--anew"]) == 0
 
 
 def test_a_run_that_stops_itself_exits_3_and_leaves_its_last_good_state(

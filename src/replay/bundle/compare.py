@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, Literal
+from typing import Any, Literal
 
-from replay.bundle import bag
-from replay.bundle.contents import gather
-from replay.bundle.members import Members, open_members
 from replay.bundle.numbers import Apart, worst
-from replay.bundle.verify import read_listing
-from replay.errors import BundleError
+from replay.bundle.sealed import Listed, SealedRun, open_run
+from replay.bundle.units import unit_of
 from replay.manifest import NAME as MANIFEST
 
 Outcome = Literal["same", "within", "differs", "missing", "extra", "not compared"]
@@ -46,12 +42,18 @@ class Difference:
     outcome: Outcome
     worst: Apart | None = None
 
+    @property
+    def kind(self) -> str:
+        """Class of the artifact, or provenance: where a run came from, told when it differs but not compared."""
+        return "provenance" if self.outcome == "not compared" and self.class_ != "volatile" else self.class_
+
     def sentence(self) -> str:
         """Say it in one line."""
         text = f"{self.path} ({self.class_}): {self.outcome}"
         if self.worst is None:
             return text
-        unit = f" {self.unit}" if self.unit else ""
+        unit = "" if math.isnan(self.worst.absolute) else self.unit or unit_of(self.worst.where)
+        unit = f" {unit}" if unit else ""
         text += f", worst at {self.worst.where}: {self.worst.old}{unit} -> {self.worst.new}{unit}"
         if not math.isnan(self.worst.absolute):
             text += f" (by {self.worst.absolute:.3g}{unit}, relative {self.worst.relative:.2g})"
@@ -60,11 +62,24 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs side by side; the worst artifacts first."""
+    """Two runs side by side.
+
+    Parameters
+    ----------
+    old, new
+        The runs.
+    differences
+        Every artifact: those that differ first, each outcome in the order of the workflow.
+    """
 
     old: Path
     new: Path
     differences: tuple[Difference, ...]
+
+    @property
+    def first(self) -> Difference | None:
+        """The first artifact in the order of the workflow that differs: there the runs parted."""
+        return next((d for d in self.differences if d.outcome == "differs"), None)
 
     @property
     def agree(self) -> bool:
@@ -81,28 +96,19 @@ class Comparison:
         return sum(d.outcome == outcome for d in self.differences)
 
     def text(self) -> str:
-        """Say it in a few lines: the counts, then what is not the same, worst first."""
-        head = "the runs agree" if self.agree else "the runs differ"
-        counts = ", ".join(f"{self.count(o)} {o}" for o in _ORDER if self.count(o))
-        rows = [d.sentence() for d in self.differences if d.outcome not in ("same", "not compared")]
+        """Say it in a few lines: the counts by class, where the runs parted, then all that is not the same."""
+        counts = []
+        for kind in ("exact", "tolerance", "provenance", "volatile"):
+            found = Counter(d.outcome for d in self.differences if d.kind == kind)
+            counts += [f"{kind} " + ", ".join(f"{found[o]} {o}" for o in _ORDER if found[o])] if found else []
+        lines = [f"the runs {'agree' if self.agree else 'differ'}: {'; '.join(counts)}"]
+        if self.first:
+            lines.append(f"first to differ, in the order of the workflow:\n  {self.first.sentence()}")
+        rest = [d for d in self.differences if d.outcome not in ("same", "not compared") and d is not self.first]
+        lines += ["also:", *(f"  {d.sentence()}" for d in rest)] if rest else []
         if any(d.outcome == "not compared" and d.path == "source/source.tar" for d in self.differences):
-            rows.append("the runs were made with different source (source/source.tar)")
-        return "\n".join([f"{head}: {counts}", *rows])
-
-
-@dataclass(frozen=True)
-class _Artifact:
-    class_: str
-    rtol: float
-    atol: float
-    unit: str
-    open: Callable[[], BinaryIO]
-
-
-@dataclass(frozen=True)
-class _Side:
-    sealed: bool
-    artifacts: dict[str, _Artifact]
+            lines.append("the runs were made with different source (source/source.tar)")
+        return "\n".join(lines)
 
 
 def compare(old: str | Path, new: str | Path) -> Comparison:
@@ -122,49 +128,24 @@ def compare(old: str | Path, new: str | Path) -> Comparison:
         When a results folder changed since its stages wrote it.
     """
     old, new = Path(old), Path(new)
-    with _open(old) as before, _open(new) as after:
+    with open_run(old) as before, open_run(new) as after:
         both = before.sealed and after.sealed
-        names = sorted(name for name in {*before.artifacts, *after.artifacts} if both or name.startswith("results/"))
+        names = sorted(name for name in {*before.files, *after.files} if both or name.startswith("results/"))
         found = [_compare_one(name, before, after) for name in names]
-    found.sort(key=lambda d: (_ORDER[d.outcome], -_beyond(d), d.path))
+        stages = [*before.stages(), *after.stages()]
+    found.sort(key=lambda d: (_ORDER[d.outcome], _place(d.path, stages)))
     return Comparison(old, new, tuple(found))
 
 
-def _beyond(difference: Difference) -> float:
-    relative = difference.worst.relative if difference.worst else math.nan
-    return math.inf if math.isnan(relative) else relative
+def _place(path: str, stages: list[str]) -> tuple[int, bool, str]:
+    """Where in the workflow a file comes: what is no result first, then by stage, its manifest after its files."""
+    parts = path.split("/")
+    stage = stages.index(parts[1]) if parts[0] == "results" and parts[1] in stages else -1
+    return stage, parts[-1] == MANIFEST, path
 
 
-@contextmanager
-def _open(path: Path) -> Iterator[_Side]:
-    if path.is_dir() and not (path / "bagit.txt").is_file():
-        run = gather(path)
-        yield _Side(
-            False,
-            {i.path: _Artifact(i.class_, i.rtol or 0.0, i.atol or 0.0, i.unit, i.open) for i in run.items},
-        )
-        return
-    with open_members(path) as members:
-        yield _Side(True, {row["path"]: _listed(members, row) for row in read_listing(members)})
-
-
-def _listed(members: Members, row: dict[str, str]) -> _Artifact:
-    name = bag.PAYLOAD + row["path"]
-    if name not in members.sizes:
-        message = (
-            f"{members.label}: {name}: is missing, but artifacts.csv lists it\n    mend: `replay verify` says more"
-        )
-        raise BundleError(message)
-    try:
-        rtol, atol = (float(row[key] or 0.0) for key in ("rtol", "atol"))
-    except ValueError:
-        message = f"{members.label}: artifacts.csv: the tolerances of {row['path']} are no numbers"
-        raise BundleError(message) from None
-    return _Artifact(row["class"], rtol, atol, row["unit"], lambda: members.open(name))
-
-
-def _compare_one(name: str, before: _Side, after: _Side) -> Difference:
-    old, new = before.artifacts.get(name), after.artifacts.get(name)
+def _compare_one(name: str, before: SealedRun, after: SealedRun) -> Difference:
+    old, new = before.files.get(name), after.files.get(name)
     either = old or new
     assert either is not None
     if either.class_ == "volatile":
@@ -189,7 +170,7 @@ def _is_numeric(name: str) -> bool:
     return name.endswith((".csv", ".json", ".h5", ".hdf5", ".vtkhdf", ".npy", ".npz"))
 
 
-def _same_bytes(old: _Artifact, new: _Artifact) -> bool:
+def _same_bytes(old: Listed, new: Listed) -> bool:
     with old.open() as a, new.open() as b:
         while True:
             one, other = a.read(1 << 20), b.read(1 << 20)
@@ -199,9 +180,9 @@ def _same_bytes(old: _Artifact, new: _Artifact) -> bool:
                 return True
 
 
-def _essence(artifact: _Artifact, *sides: _Side) -> Any:
+def _essence(artifact: Listed, *sides: SealedRun) -> Any:
     """Read a stage's manifest without the sizes and hashes of files that may differ within tolerance."""
-    loose = {name for side in sides for name, a in side.artifacts.items() if a.class_ == "tolerance"}
+    loose = {name for side in sides for name, a in side.files.items() if a.class_ == "tolerance"}
     with artifact.open() as stream:
         value = json.load(stream)
     for entry in value["artifacts"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -87,11 +87,12 @@ class Run:
     play
         Name of the play.
     manifests
-        Stage to manifest, by name.
+        Stage to manifest, in the order of the workflow.
     items, left_out
         What goes into the bundle, and what does not.
     verdict
-        ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, or ``NOT JUDGED`` for a run without verdict.
+        ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, ``INTERRUPTED`` for a run that did not come to
+        its end, or ``NOT JUDGED`` for one without a verdict.
     line
         The verdict in one line.
     failures
@@ -107,7 +108,7 @@ class Run:
     failures: dict[str, str]
 
 
-def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) -> Run:
+def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None, unfinished: Sequence[str] = ()) -> Run:
     """Read a results folder, checking every file against its stage's manifest.
 
     Parameters
@@ -116,6 +117,8 @@ def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) ->
         ``results/<play>``: one folder a stage, each with its manifest.
     withhold
         Payload path to the reason why its bytes may not be shared; hash and reason go in instead.
+    unfinished
+        Stages that the run did not come to: the verdict is then ``INTERRUPTED``, whatever an older one said.
 
     Raises
     ------
@@ -158,8 +161,28 @@ def gather(results: str | Path, *, withhold: Mapping[str, str] | None = None) ->
             expected=f"stages of {results.name} alone",
             mend="remove the folder and run the play again",
         )
-    verdict, line = _verdict(results)
+    verdict, line = _verdict(results, unfinished)
+    order = workflow_order({name: [i.path for i in manifest.inputs] for name, manifest in manifests.items()})
+    manifests = {name: manifests[name] for name in order}
     return Run(results.name, manifests, tuple(items), tuple(left), verdict, line, _failures(results, manifests))
+
+
+def workflow_order(read: Mapping[str, Sequence[str]]) -> list[str]:
+    """Order stages so that each comes after those it read from; stages that read nothing were never run and come last.
+
+    Parameters
+    ----------
+    read
+        Stage to the names of its inputs (``driver/driver_6dof.csv``).
+    """
+    order: list[str] = []
+    waiting = {name: {path.partition("/")[0] for path in paths} & set(read) - {name} for name, paths in read.items()}
+    while waiting:
+        ready = [name for name, before in waiting.items() if before <= set(order)]
+        first = min(ready or waiting, key=lambda name: (not read[name], name))
+        order.append(first)
+        del waiting[first]
+    return order
 
 
 def _item(path: str, folder: Path, artifact: Artifact) -> Item:
@@ -193,7 +216,9 @@ def _unlisted(folder: Path, prefix: str, manifest: StageManifest) -> list[LeftOu
     return [LeftOut(path, reason) for path, reason in left.items()]
 
 
-def _verdict(results: Path) -> tuple[str, str]:
+def _verdict(results: Path, unfinished: Sequence[str]) -> tuple[str, str]:
+    if unfinished:
+        return "INTERRUPTED", f"{results.name}: the run ended before {', '.join(unfinished)}; nothing was judged"
     path = results / "verdict" / "verdict.json"
     if not path.is_file():
         return "NOT JUDGED", "the run ended before its verdict"

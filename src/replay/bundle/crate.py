@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -59,6 +59,8 @@ class About:
         Versions of this program and of the workflow engine.
     workflow, config
         Payload paths of the main workflow file and of its settings.
+    programs
+        Version of each program that the stages stand on.
     author, publisher, license
         As the user gives them; ``license`` is a URL.
     """
@@ -68,6 +70,7 @@ class About:
     engine_version: str
     workflow: str
     config: str
+    programs: Mapping[str, str] = field(default_factory=dict)
     author: str = ""
     publisher: str = ""
     license: str = _LICENSE
@@ -158,10 +161,16 @@ def _add_run(
         return crate.add(ContextEntity(crate, identifier, {"@type": kind, "name": name, **properties}))
 
     engine = add("#snakemake", "SoftwareApplication", "Snakemake", softwareVersion=about.engine_version)
+    programs = [
+        add(f"#{name}", "SoftwareApplication", name, softwareVersion=version)
+        for name, version in about.programs.items()
+        if name != "snakemake"
+    ]
     tools, steps, actions, controls = [], [], [], []
     for position, (stage, manifest) in enumerate(run.manifests.items()):
         version = manifest.versions.get("replay", about.replay_version)
         tool = add(f"#stage-{stage}", "SoftwareApplication", f"replay stage {stage}", softwareVersion=version)
+        tool["softwareRequirements"] = programs
         step = add(f"{about.workflow}#step-{stage}", "HowToStep", stage, position=str(position))
         step["workExample"] = tool
         action = add(f"#run-{stage}", "CreateAction", f"{stage} of {run.play}", **_outcome(run.failures.get(stage)))
@@ -202,7 +211,7 @@ def _outcome(failure: str | None) -> dict[str, str]:
 
 
 def _whole_failure(run: Run) -> str | None:
-    return f"{run.verdict}: {run.line}" if run.verdict in ("REJECTED", "NOT JUDGED") else None
+    return f"{run.verdict}: {run.line}" if run.verdict in ("REJECTED", "INTERRUPTED", "NOT JUDGED") else None
 
 
 def _stamp(action: Any, job: Job | None) -> None:

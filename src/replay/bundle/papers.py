@@ -18,24 +18,30 @@ _PROGRAMS = ("h5py", "numba", "numpy", "opencv-python-headless", "pandas", "scip
 def readme_text(run: Run, *, resolution: str, with_play: bool) -> str:
     """Text of the README: the verdict, three commands, and what lies where."""
     play = run.play
-    rerun = [f"mkdir again && tar -xf {play}/data/source/source.tar -C again && make -C again run PLAY={play}"]
+    make = [f"make -C again run PLAY={play}"]
     if with_play:
-        rerun.append(f'PLAYS="$PWD/{play}/data/plays"')
+        make.append(f'PLAYS="$PWD/{play}/data/plays"')
     if resolution:
-        rerun.append(f"RESOLUTION={resolution}")
+        make.append(f"RESOLUTION={resolution}")
     return f"""# Replay of the play {play}: {run.verdict}
 
 {run.line}
 
 Process outputs and diagnostics of a reproduced motion. No statement on injury.
 
-Verify, unpack, run again:
+Verify, look, run again:
 
     replay verify {play}.zip
-    unzip {play}.zip
-    {" ".join(rerun)}
+    replay show {play}.zip
+    replay rerun {play}.zip --into again
 
-Without the `replay` program, `cd {play} && sha256sum -c manifest-sha256.txt` checks the unpacked files.
+The last shows every command and asks before it runs them; then it compares, artifact by artifact.
+
+Without the `replay` program, any machine with unzip, sha256sum, make and Python 3.11 does the same:
+
+    unzip {play}.zip && (cd {play} && sha256sum --quiet -c manifest-sha256.txt)
+    mkdir again && tar -xf {play}/data/source/source.tar -C again
+    {" ".join(make)}
 
 | where | what |
 |---|---|
@@ -47,10 +53,27 @@ Without the `replay` program, `cd {play} && sha256sum -c manifest-sha256.txt` ch
 | `bundle.json` | play, verdict, the minimum reproducibility package, and what was left out and why |
 | `machine.json` | the machine and the installed versions (differs from machine to machine) |
 | `ro-crate-metadata.json` | the run as a Workflow Run RO-Crate: one action a stage |
-
+{_withheld(run)}
 `replay compare {play}.zip OTHER.zip` compares two runs: files of class `exact` byte for byte, files of
-class `tolerance` number by number.
+class `tolerance` number by number. `replay agree {play}.zip OTHER.zip` compares two laboratories' digitisations
+of one video.
 """
+
+
+def _withheld(run: Run) -> str:
+    """Say which files are named by hash alone."""
+    rows = [f"| `{left.path}` | {left.reason} | `{left.sha256}` |" for left in run.left_out if left.sha256]
+    if not rows:
+        return ""
+    return "\n".join(
+        [
+            "\nWithheld; whoever has them can check them by their hash:\n",
+            "| file | why | sha256 |",
+            "|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
 
 
 def bundle_facts(

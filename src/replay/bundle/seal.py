@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import platform
 import tempfile
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ def seal(
     job_records: str | Path | None = None,
     extra_files: Mapping[str, str | Path] | None = None,
     withhold: Mapping[str, str] | None = None,
+    unfinished: Sequence[str] = (),
     metadata: Mapping[str, str] | None = None,
 ) -> str:
     """Seal the results of one play, accepted or not, and write ``<destination>.sha256`` beside the archive.
@@ -59,6 +61,8 @@ def seal(
         Further files by payload path.
     withhold
         Payload path to the reason why its bytes may not be shared: hash and reason are sealed instead.
+    unfinished
+        Stages that the run did not come to; the bundle says ``INTERRUPTED`` then.
     metadata
         Any of ``author``, ``publisher``, ``license`` (URL), ``date`` (ISO 8601).
 
@@ -80,10 +84,12 @@ def seal(
     if unknown := set(metadata) - {"author", "publisher", "license", "date"}:
         message = f"metadata {sorted(unknown)} unknown"
         raise ValueError(message)
-    source = read_source(source_root if source_root is not None else Path(__file__).resolve().parents[3])
     plays, left_plays = _play_items(play_folder, withhold)
-    run = gather(results, withhold={k: v for k, v in withhold.items() if not k.startswith("plays/")})
+    of_results = {name: reason for name, reason in withhold.items() if not name.startswith("plays/")}
+    run = gather(results, withhold=of_results, unfinished=unfinished)
     run = replace(run, left_out=(*run.left_out, *left_plays))
+    root = source_root if source_root is not None else Path(__file__).resolve().parents[3]
+    source = read_source(root, without=frozenset(left.sha256 for left in run.left_out if left.sha256))
     jobs = read_jobs(job_records, run.play)
     destination.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=destination.parent, prefix=".sealing.") as folder:
@@ -201,6 +207,7 @@ def _about(run: Run, source: Source, jobs: Mapping[str, Job], metadata: Mapping[
         engine_version=version_of("snakemake"),
         workflow=_WORKFLOW,
         config=next(path for path in configs if path in paths),
+        programs={"python": platform.python_version(), **machine_facts()["programs"]},
         **{key: metadata[key] for key in ("author", "publisher", "license") if key in metadata},
     )
 

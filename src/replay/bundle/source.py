@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import tarfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from replay.errors import InputError, ReplayError
+from replay.files import sha256
 
 # Of what git does not know yet, that which a run depends on.
 _CODE = ("src", "workflow", "profiles", "container")
@@ -36,6 +37,8 @@ class Source:
         Difference of the files to the commit, empty when there is none.
     untracked
         Files of the code that git does not know.
+    withheld
+        Files that were left out because their bytes may not be shared.
     """
 
     root: Path
@@ -44,16 +47,26 @@ class Source:
     committed: str | None
     diff: bytes
     untracked: tuple[str, ...]
+    withheld: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the content of ``source.json``."""
+        left = {"withheld": list(self.withheld)} if self.withheld else {}
         if self.commit is None:
-            return {"commit": None, "note": "not a git checkout: the snapshot is all that is known"}
-        return {"commit": self.commit, "dirty": bool(self.diff or self.untracked), "untracked": list(self.untracked)}
+            return {"commit": None, "note": "not a git checkout: the snapshot is all that is known", **left}
+        dirty = bool(self.diff or self.untracked)
+        return {"commit": self.commit, "dirty": dirty, "untracked": list(self.untracked), **left}
 
 
-def read_source(root: str | Path) -> Source:
+def read_source(root: str | Path, *, without: frozenset[str] = frozenset()) -> Source:
     """List the source tree at `root`, with the help of git where it is a checkout.
+
+    Parameters
+    ----------
+    root
+        Its folder.
+    without
+        Hashes (sha256) of files whose bytes may not be shared: wherever such a file lies, it is left out.
 
     Raises
     ------
@@ -70,8 +83,16 @@ def read_source(root: str | Path) -> Source:
             )
     # A checkout of its own, not a folder somewhere inside another one.
     if (root / ".git").exists() and _git(root, "rev-parse", "--verify", "-q", "HEAD") is not None:
-        return _from_git(root)
-    return Source(root, tuple(sorted(_walk(root))), None, None, b"", ())
+        return _from_git(root, without)
+    files, withheld = _split(root, sorted(_walk(root)), without)
+    return Source(root, files, None, None, b"", (), withheld)
+
+
+def _split(root: Path, names: Iterable[str], without: frozenset[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Files to keep, and files to leave out."""
+    names = list(names)
+    left = [name for name in names if without and sha256(root / name) in without]
+    return tuple(name for name in names if name not in left), tuple(left)
 
 
 def _walk(root: Path) -> Iterator[str]:
@@ -84,13 +105,16 @@ def _walk(root: Path) -> Iterator[str]:
                 yield path.relative_to(root).as_posix()
 
 
-def _from_git(root: Path) -> Source:
+def _from_git(root: Path, without: frozenset[str]) -> Source:
     tracked = _names(_must(root, "ls-files", "-z"))
     unknown = _names(_must(root, "ls-files", "-z", "--others", "--exclude-standard", "--", *_CODE))
     files = [n for n in {*tracked, *unknown} if (root / n).is_file() and not (root / n).is_symlink()]
-    diff = _must(root, "diff", "--binary", "--no-ext-diff", "--no-textconv", "--no-color", "--no-renames", "HEAD")
+    kept, withheld = _split(root, sorted(files), without)
+    options = ("--binary", "--no-ext-diff", "--no-textconv", "--no-color", "--no-renames", "HEAD", "--", ".")
+    diff = _must(root, "diff", *options, *(f":(exclude,literal){name}" for name in withheld))
     commit, _, date = _must(root, "show", "-s", "--format=%H %cI", "HEAD").decode().strip().partition(" ")
-    return Source(root, tuple(sorted(files)), commit, date, diff, tuple(sorted(unknown)))
+    untracked = tuple(sorted(set(unknown) - set(withheld)))
+    return Source(root, kept, commit, date, diff, untracked, withheld)
 
 
 def _names(listing: bytes) -> list[str]:

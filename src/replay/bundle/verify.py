@@ -41,7 +41,8 @@ class VerifyReport:
     path
         The archive or folder.
     play, verdict, line
-        As sealed; the verdict is ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED`` or ``NOT JUDGED``.
+        As sealed; the verdict is ``ACCEPTED``, ``ACCEPTED WITH WARNINGS``, ``REJECTED``, ``INTERRUPTED`` or
+        ``NOT JUDGED``.
     files, bytes
         Number and size of the payload's files.
     sha256
@@ -138,8 +139,7 @@ def _read_tags(members: Members) -> dict[str, dict[str, str]]:
     manifests = {}
     for kind in ("tagmanifest", "manifest"):
         for algorithm in bag.ALGORITHMS:
-            name = f"{kind}-{algorithm}.txt"
-            manifests[name] = bag.parse_manifest(_text(members, name), f"{members.label}: {name}", algorithm)
+            manifests[f"{kind}-{algorithm}.txt"] = read_manifest_of(members, algorithm, kind)
     expected = {"bagit.txt", "bag-info.txt", *(f"manifest-{a}.txt" for a in bag.ALGORITHMS)}
     for algorithm in bag.ALGORITHMS:
         name = f"tagmanifest-{algorithm}.txt"
@@ -226,6 +226,18 @@ def _check_crate(members: Members, payload: Mapping[str, bag.Digest]) -> None:
         described.add(file)
     if missing := sorted(set(payload) - described - {CRATE}):
         raise _refuse(members, bag.PAYLOAD + missing[0], f"is not described by {CRATE}")
+
+
+def read_manifest_of(members: Members, algorithm: str, kind: str = "manifest") -> dict[str, str]:
+    """Read a manifest of a bundle: file to hex digest.
+
+    Raises
+    ------
+    BundleError
+        When it is missing or malformed.
+    """
+    name = f"{kind}-{algorithm}.txt"
+    return bag.parse_manifest(_text(members, name), f"{members.label}: {name}", algorithm)
 
 
 def read_listing(members: Members) -> list[dict[str, str]]:

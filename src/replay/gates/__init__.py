@@ -1,5 +1,6 @@
 """Gates: every accept or reject decision of the protocol, and nothing else."""
 
+from replay.gates.agreement import agreement_gate
 from replay.gates.assembly import assembly_gate
 from replay.gates.fidelity import fidelity_gate
 from replay.gates.helmet import helmet_gate
@@ -19,6 +20,7 @@ __all__ = [
     "Limits",
     "PartEnergy",
     "PlayVerdict",
+    "agreement_gate",
     "assembly_gate",
     "convergence_class",
     "fidelity_gate",

@@ -13,6 +13,7 @@ def limits_markdown(limits: Limits | None = None) -> str:
     blocks = []
     for gate in limits.gates.values():
         stops = "stops the play when it fails" if gate.stops_run else "sets the verdict, does not stop the play"
+        stops = "judges finished plays against each other" if gate.between_plays else stops
         lines = [f"### {gate.title} (`{gate.name}`)", "", f"From: {gate.source}. It {stops}.", ""]
         lines += ["| check | limit | unit | source |", "|---|---|---|---|"]
         for name, limit in limits.of(gate.name).items():

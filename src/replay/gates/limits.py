@@ -102,6 +102,7 @@ class GateFacts:
     title: str
     stops_run: bool
     source: str
+    between_plays: bool = False
 
 
 class Limits:
@@ -118,6 +119,11 @@ class Limits:
     def __init__(self, limits: Mapping[str, Limit], gates: Mapping[str, GateFacts]) -> None:
         self._limits = MappingProxyType(dict(limits))
         self.gates = MappingProxyType(dict(gates))
+
+    @property
+    def protocol(self) -> dict[str, GateFacts]:
+        """The gates that every play passes, in order; without those that judge plays against each other."""
+        return {name: facts for name, facts in self.gates.items() if not facts.between_plays}
 
     @classmethod
     def load(cls, overrides: Mapping[str, Any] | None = None, *, file: str | Path = "play.yaml") -> Limits:

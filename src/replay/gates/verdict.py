@@ -97,9 +97,9 @@ def play_verdict(
         is not accepted.
     """
     given = {gate.name: gate for gate in (gates.values() if isinstance(gates, Mapping) else gates)}
-    ordered = tuple(given[name] for name in limits.gates if name in given)
+    ordered = tuple(given[name] for name in limits.protocol if name in given)
     stopped_by = next((gate.name for gate in ordered if gate.stops), "")
-    missing = tuple(name for name in limits.gates if name not in given and name not in awaited)
+    missing = tuple(name for name in limits.protocol if name not in given and name not in awaited)
     worst = {gate.verdict for gate in ordered}
     causes = [(gate, check) for gate in ordered for check in gate.causes()]
     causes.sort(key=lambda cause: _WORST_FIRST.index(cause[1].verdict))

@@ -1,10 +1,12 @@
 """Measures: numbers that describe a motion, a deformation, a run; none of them a verdict on a person."""
 
 from replay.measures.action import ACTION_TABLE, crossover_time, kinetic_energy_of, mechanical_action, write_action
+from replay.measures.agreement import Agreement, Digitisation, agreement
 from replay.measures.brain import BrainRecorder, read_snapshots, regional_summary
 from replay.measures.fidelity import Motion, compare, fidelity
 from replay.measures.head import bric, damage_deflection, hic, peak, resultant, severity_index
 from replay.measures.kinematics import head_measures
+from replay.measures.rating import Rating, iso_18571, rate
 from replay.measures.shake import ShakeRecorder, shake_measures
 from replay.measures.strain import (
     green_lagrange,
@@ -19,9 +21,13 @@ from replay.measures.strain import (
 
 __all__ = [
     "ACTION_TABLE",
+    "Agreement",
     "BrainRecorder",
+    "Digitisation",
     "Motion",
+    "Rating",
     "ShakeRecorder",
+    "agreement",
     "bric",
     "compare",
     "crossover_time",
@@ -30,12 +36,14 @@ __all__ = [
     "green_lagrange",
     "head_measures",
     "hic",
+    "iso_18571",
     "kinetic_energy_of",
     "logarithmic",
     "maximum_shear_strain",
     "mechanical_action",
     "peak",
     "principal_stretches",
+    "rate",
     "read_snapshots",
     "regional_summary",
     "resultant",

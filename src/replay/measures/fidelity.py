@@ -13,6 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from replay.errors import InputError
 from replay.measures.head import Peak, peak, resultant
+from replay.measures.rating import rate
 
 _HISTORY_FILE = "histories.csv"
 
@@ -222,22 +223,26 @@ def rotation_residual_deg(target: Motion, applied: Motion) -> float:
 
 def fidelity(target: Motion, applied: Motion) -> dict[str, Any]:
     """Return the content of fidelity.json: each quantity of the article's Table 4, and the residuals."""
-    t, a = target.time_s, applied.time_s
     return {
-        "linear_acceleration": {
-            "unit": "m/s^2",
-            **compare(t, target.acceleration_m_per_s2, a, applied.acceleration_m_per_s2).to_json(),
-        },
-        "angular_acceleration": {
-            "unit": "rad/s^2",
-            **compare(t, target.angular_acceleration_rad_per_s2, a, applied.angular_acceleration_rad_per_s2).to_json(),
-        },
-        "angular_velocity": {
-            "unit": "rad/s",
-            **compare(t, target.angular_velocity_rad_per_s, a, applied.angular_velocity_rad_per_s).to_json(),
-        },
+        "linear_acceleration": _entry("m/s^2", target, applied, "acceleration_m_per_s2"),
+        "angular_acceleration": _entry("rad/s^2", target, applied, "angular_acceleration_rad_per_s2"),
+        "angular_velocity": _entry("rad/s", target, applied, "angular_velocity_rad_per_s"),
         "position_residual_mm": position_residual_mm(target, applied),
         "rotation_residual_deg": rotation_residual_deg(target, applied),
+    }
+
+
+def _entry(unit: str, target: Motion, applied: Motion, name: str) -> dict[str, Any]:
+    """One quantity: its comparison, and the ISO/TS 18571 rating of its resultant (None where that is constant)."""
+    wanted, given = getattr(target, name), getattr(applied, name)
+    try:
+        rating = rate(target.time_s, resultant(wanted), applied.time_s, resultant(given)).overall
+    except ValueError:
+        rating = None
+    return {
+        "unit": unit,
+        **compare(target.time_s, wanted, applied.time_s, given).to_json(),
+        "iso_18571_rating": rating,
     }
 
 

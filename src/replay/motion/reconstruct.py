@@ -6,20 +6,18 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from replay.errors import InputError
 from replay.files import write_text
 from replay.motion.bands import band
+from replay.motion.clip import load_clip
 from replay.motion.driver import Driver, axis_points, build_driver
 from replay.motion.kinematics import KINEMATICS, Kinematics
 from replay.motion.null import null_peaks
 from replay.motion.posterior import PosteriorMotion, reconstruct_posterior
 from replay.motion.protocol import ProtocolMotion, along_ray, peak_frame, reconstruct_clicks
 from replay.motion.quality import FrameQuality, ReconstructionQuality, frame_quality, video_quality, wearable_quality
-from replay.motion.settings import load_camera
 from replay.motion.side_by_side import (
     CLICK_WEIGHTS,
     KINEMATICS_BOTH,
@@ -33,7 +31,6 @@ from replay.motion.side_by_side import (
     spin_band,
 )
 from replay.motion.summary import summary
-from replay.motion.tracks import read_clicks, read_template
 from replay.motion.wearable import read_wearable, reconstruct_wearable
 from replay.play import ClicksSource, Play, WearableSource
 from replay.tables import Column, TableFormat
@@ -278,43 +275,8 @@ def check_tracks(play: Play) -> dict[str, Any]:
             "rate_hz": float(1.0 / np.median(np.diff(time))),
             "channels": list(channels),
         }
-    camera = load_camera(play.file(source.camera))
-    template = read_template(play.file(source.landmarks))
-    tracks = read_clicks(play.file(source.clicks), template, camera.size)
-    facts: dict[str, Any] = {
-        "fps": camera.fps,
-        "image_size": [int(v) for v in camera.size],
-        "frames": len(tracks.frames),
-        "first_frame": int(tracks.frames[0]),
-        "landmarks": list(template.names),
-        "clicks": int(tracks.seen.sum()),
-        "warnings": camera.warnings(),
-    }
-    if source.video:
-        facts["video"] = video_facts(play.file(source.video))
-    return facts
-
-
-def video_facts(path: Path) -> dict[str, Any]:
-    """Frame rate, resolution and frame count of a video (protocol 2.1).
-
-    Raises
-    ------
-    InputError
-        When OpenCV cannot open it.
-    """
-    video = cv2.VideoCapture(str(path))
-    try:
-        if not video.isOpened():
-            found = "cannot be opened as a video"
-            raise InputError(path, found, expected="a video OpenCV reads", mend="convert it to MP4 (H.264)")
-        return {
-            "fps": float(video.get(cv2.CAP_PROP_FPS)),
-            "image_size": [int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT))],
-            "frames": int(video.get(cv2.CAP_PROP_FRAME_COUNT)),
-        }
-    finally:
-        video.release()
+    clip = load_clip(play, source)
+    return {**clip.facts, "warnings": [*clip.camera.warnings(), *clip.warnings]}
 
 
 def reconstruct(play: Play) -> Reconstruction:
@@ -331,9 +293,8 @@ def reconstruct(play: Play) -> Reconstruction:
 
 
 def _from_clicks(play: Play, source: ClicksSource) -> Reconstruction:
-    camera = load_camera(play.file(source.camera))
-    template = read_template(play.file(source.landmarks))
-    tracks = read_clicks(play.file(source.clicks), template, camera.size)
+    clip = load_clip(play, source)
+    camera, template, tracks = clip.camera, clip.template, clip.tracks
     motion = reconstruct_clicks(tracks, template, camera)
     k = motion.kinematics
     angular = float(k.time_s[peak_frame(k.alpha_resultant)])
@@ -353,7 +314,7 @@ def _from_clicks(play: Play, source: ClicksSource) -> Reconstruction:
         t0_s=t0,
         t0_angular_s=angular,
         t0_linear_s=linear,
-        quality=quality,
+        quality=replace(quality, warnings=(*clip.warnings, *quality.warnings)),
         tables={
             "poses_per_frame.csv": (POSES, _pose_columns(motion)),
             "qc_per_frame.csv": (QC, _qc_columns(motion, frames, posterior)),

@@ -1,8 +1,7 @@
-"""Readers of the article's clicks and landmark template; each names what it refuses by line."""
+"""Tracks of a clip, the formats of the article's two tables, and the reader of its landmark template."""
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +21,25 @@ CLICKS = TableFormat(
 )
 """Format of ``kinovea_clicks.csv``."""
 
+WEIGHTED_CLICKS = TableFormat(
+    "click table with weights",
+    (
+        *CLICKS.columns,
+        Column("weight", "variance of a careful click over this one's, above 0, at most 1"),
+    ),
+)
+"""Format of ``kinovea_clicks.csv`` where clicks differ in worth."""
+
+DIGITISED = TableFormat(
+    "digitised clicks",
+    (
+        *WEIGHTED_CLICKS.columns,
+        Column("sigma_px", "standard deviation that following adds to the click, per coordinate [px]"),
+        Column("source", "click, or followed", kind="text"),
+    ),
+)
+"""Format that ``replay digitize`` writes; a click table with two columns more."""
+
 TEMPLATE = TableFormat(
     "landmark template",
     (
@@ -34,8 +52,6 @@ TEMPLATE = TableFormat(
 """Format of ``helmet_landmarks.csv``."""
 
 LARGEST_HELMET_M = 1.0
-LARGEST_GAP_FRAMES = 2
-FEWEST_FRAMES = 5
 _MOST_ERRORS = 20
 
 
@@ -135,117 +151,6 @@ def read_template(path: Path) -> Template:
                 mend="add a landmark off that line",
             )
         )
-    _raise(errors)
-    return Template(tuple(names), points)
-
-
-def read_clicks(path: Path, template: Template, size: tuple[float, float]) -> Tracks:
-    """Read ``kinovea_clicks.csv``.
-
-    Parameters
-    ----------
-    path
-        The table.
-    template
-        Landmarks that may be clicked.
-    size
-        Width and height of the image [px].
-
-    Raises
-    ------
-    InputError, InputErrors
-        Missing columns or numbers, unknown landmarks, a landmark twice in a frame, frames out of
-        order, clicks far outside the image, gaps and frames with fewer than three landmarks that
-        cannot be bridged.
-    """
-    table = CLICKS.read(path)
-    lines = table.attrs["lines"]
-    errors: list[InputError] = []
-    where: dict[tuple[int, str], int] = {}
-    latest = None
-    width, height = size
-    for line, frame, name, u, v in zip(lines, table["frame"], table["landmark_id"], table["u_px"], table["v_px"]):
-        if name not in template.names:
-            close = difflib.get_close_matches(name, template.names, n=1)
-            errors.append(
-                InputError(
-                    path,
-                    f"landmark {name!r} is not in the template",
-                    line=line,
-                    column="landmark_id",
-                    expected=f"one of {', '.join(template.names)}",
-                    mend=f"did you mean {close[0]}?" if close else "correct the name or add it to the template",
-                )
-            )
-        elif (frame, name) in where:
-            errors.append(
-                InputError(
-                    path,
-                    f"landmark {name} is clicked twice in frame {frame} (first in line {where[frame, name]})",
-                    line=line,
-                    column="landmark_id",
-                    expected="one click of each landmark in a frame",
-                    mend="remove one of the two rows",
-                )
-            )
-        where.setdefault((frame, name), line)
-        if latest is not None and frame < latest:
-            errors.append(
-                InputError(
-                    path,
-                    f"frame {frame} comes after frame {latest}: frames are out of order",
-                    line=line,
-                    column="frame",
-                    expected="rows sorted by frame",
-                    mend="sort the rows by frame, and check that no other clip was appended",
-                )
-            )
-        latest = frame if latest is None else max(latest, frame)
-        if not (-0.5 * width <= u <= 1.5 * width and -0.5 * height <= v <= 1.5 * height):
-            errors.append(
-                InputError(
-                    path,
-                    f"the click ({u:g}, {v:g}) px lies far outside the image of {width:g} x {height:g} px",
-                    line=line,
-                    column="u_px, v_px",
-                    expected="pixels from the top left corner, v downward",
-                    mend="check the coordinate origin of the export, and image_size in the camera file",
-                )
-            )
-    _raise(errors)
-    frames = np.arange(int(table["frame"].min()), int(table["frame"].max()) + 1)
-    pixels = np.full((len(frames), len(template.names), 2), np.nan)
-    rows = table["frame"].to_numpy() - frames[0]
-    columns = np.array([template.names.index(name) for name in table["landmark_id"]])
-    pixels[rows, columns, 0] = table["u_px"]
-    pixels[rows, columns, 1] = table["v_px"]
-    tracks = Tracks(frames, pixels)
-    _refuse_gaps(path, tracks)
-    return tracks
-
-
-def _refuse_gaps(path: Path, tracks: Tracks) -> None:
-    enough = tracks.seen.sum(axis=1) >= 3
-    if len(tracks.frames) < FEWEST_FRAMES:
-        raise InputError(
-            path,
-            f"{len(tracks.frames)} frames are too few to differentiate twice",
-            expected=f"at least {FEWEST_FRAMES} consecutive frames",
-            mend="click more frames around the impact",
-        )
-    run = 0
-    for frame, good in zip(tracks.frames, enough):
-        run = 0 if good else run + 1
-        if run > LARGEST_GAP_FRAMES or (run and frame in (tracks.frames[0], tracks.frames[-1])):
-            raise InputError(
-                path,
-                f"frame {frame} and its neighbours show fewer than 3 landmarks",
-                column="frame",
-                expected=f"3 landmarks a frame, at most {LARGEST_GAP_FRAMES} frames in a row without, none at the ends",
-                mend="click these frames, or cut the clip there",
-            )
-
-
-def _raise(errors: list[InputError]) -> None:
     if errors:
         raise errors[0] if len(errors) == 1 else InputErrors(errors[:_MOST_ERRORS])
+    return Template(tuple(names), points)

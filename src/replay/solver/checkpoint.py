@@ -76,12 +76,16 @@ class Checkpoints:
                 digest.update(piece)
                 stream.write(piece)
             stream.write(digest.digest())
-        for old in self._files()[:-_KEPT]:
+        for old in (*self._files()[:-_KEPT], *self._debris()):
             old.unlink()
         return path
 
     def _files(self) -> list[Path]:
         return sorted(self.folder.glob(_PATTERN))
+
+    def _debris(self) -> list[Path]:
+        """What a writer that was killed has left without its name; the only writer of the folder may remove it."""
+        return sorted(self.folder.glob(f".{_PATTERN}"))
 
     def read(self) -> dict[str, NDArray[Any]] | None:
         """Arrays of the last whole checkpoint, or None where there is no file; `damaged` lists those passed over.
@@ -122,7 +126,7 @@ class Checkpoints:
 
     def clear(self) -> None:
         """Remove all checkpoints: the run has ended."""
-        for path in self._files():
+        for path in (*self._files(), *self._debris()):
             path.unlink()
         if self.folder.is_dir() and not any(self.folder.iterdir()):
             self.folder.rmdir()

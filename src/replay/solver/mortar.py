@@ -45,7 +45,7 @@ class TiedSurfaces:
     moved_m
         Greatest distance that a node was moved [m].
     loose : (k,) int
-        Rows of nodes that were too far from any master and are not tied.
+        Rows of nodes on faces that look at a master nearby, yet too far from it to be tied.
     """
 
     tie: Tie
@@ -113,7 +113,8 @@ def tie_surfaces(
     place = np.einsum("kw,kwi->ki", shares, nodes[masters])
     moved = float(np.linalg.norm(place - nodes[tied], axis=1).max())
     nodes[tied] = place
-    loose = np.array([row for row in rows if row not in weights], np.int64)
+    facing = set(tied_faces[[bool(n) for n in near]].ravel().tolist())
+    loose = np.array([row for row in rows if row in facing and row not in weights], np.int64)
     return TiedSurfaces(Tie(name, tied, masters, shares), nodes, moved, loose)
 
 
@@ -183,10 +184,9 @@ def _face_integrals(
     covered = 0.0
     for number, master in enumerate(masters):
         other = ((master - origin) @ plane.T)[::-1]
-        piece = _clipped(flat, other)
-        if len(piece) < 3:
+        points, weight = _quadrature(_clipped(flat, other))
+        if not len(points):
             continue
-        points, weight = _quadrature(piece)
         n, m = _shapes(flat, points), _shapes(other, points)[:, ::-1]
         gap = np.abs(m @ ((master - origin) @ e3) - n @ ((corners - origin) @ e3))
         if gap.max() > tolerance:
@@ -229,7 +229,7 @@ _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(_ORDER)
 
 def _quadrature(polygon: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
     """Points (q, 2) and weights (q,) on a convex polygon, exact to the eighth degree on each of its triangles."""
-    centre = polygon.mean(axis=0)
+    centre = polygon.sum(axis=0) / max(len(polygon), 1)
     u, v = (g.ravel() for g in np.meshgrid(0.5 + 0.5 * _GAUSS_X, 0.5 + 0.5 * _GAUSS_X, indexing="ij"))
     weight = (0.25 * np.outer(_GAUSS_W, _GAUSS_W)).ravel() * u
     points, weights = [], []

@@ -22,7 +22,10 @@ TIME_STEP_TABLE = TableFormat(
         Column("time_s", "time of the run"),
         Column("step", "steps done", "int"),
         Column("time_step_s", "last step"),
-        Column("stable_step_s", "stable step of the controlling element, before the factor"),
+        Column(
+            "stable_step_s",
+            "stable step before the factor: the controlling element's, shortened by joints, straps and ties",
+        ),
         Column("element_id", "controlling element; -1 where nothing deforms", "int"),
         Column("pid", "its part; -1 where nothing deforms", "int"),
         Column("added_mass_kg", "mass added by mass scaling"),

@@ -40,8 +40,12 @@ class Progress:
                 group.forces(integrator.nodal, 0.0)
             forces_s = time.perf_counter() - before
         elements = sum(int(group.group.fill.sum()) for group in integrator.groups)
+        problem = integrator.problem
+        counts = {"joints": len(problem.joints), "straps": len(problem.straps), "tied nodes": integrator.tied.count}
+        linked = "".join(f", {count} {name}" for name, count in counts.items() if count)
         self._say(
-            f"{elements} elements that deform, {len(integrator.nodal)} nodes, {integrator.bodies.count} rigid bodies; "
+            f"{elements} elements that deform, {len(integrator.nodal)} nodes, {integrator.bodies.count} rigid bodies"
+            f"{linked}; "
             f"about {steps:.0f} steps of {step:.3g} s, {size / 2**20:.1f} MiB of state"
             + (f", {_duration(steps * forces_s * _OVERHEAD)}" if forces_s else "")
         )

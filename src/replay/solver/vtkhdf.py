@@ -31,6 +31,8 @@ from replay.files import atomic_path, write_text
 
 _MAGIC = b"replay states 1\n"
 _VTK_HEXAHEDRON = 12
+#: Room for headers and indices, beyond the arrays themselves.
+_MARGIN = 1 << 19
 _STATIC_POINT = ("node_ids",)
 _STATIC_CELL = ("element_ids", "element_pid")
 _XDMF_SHAPE = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
@@ -212,7 +214,8 @@ class StatesWriter:
         """Lay the states out as ``.vtkhdf``, write the ``.xdmf`` twin, and remove the growing file."""
         if self._stream is None:
             return
-        with atomic_path(self.path) as temporary:
+        room = self._size() + 2 * self._mesh.n_bytes + _MARGIN
+        with atomic_path(self.path, reserve_bytes=room) as temporary:
             times = self._write_hdf(temporary)
         write_text(self.xdmf_path, _xdmf(self.path.name, self._mesh, self._fields, times))
         self.abandon()
@@ -318,6 +321,10 @@ class _Mesh:
         if not self.n_nodes or not self.n_hexes or self.hexes.min() < 0 or self.hexes.max() >= self.n_nodes:
             message = f"{self.n_hexes} elements name rows outside the {self.n_nodes} nodes"
             raise ValueError(message)
+
+    @property
+    def n_bytes(self) -> int:
+        return self.nodes.nbytes + self.hexes.nbytes + sum(array.nbytes for array in self.static.values())
 
     def checksum(self) -> int:
         value = 0

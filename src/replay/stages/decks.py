@@ -12,7 +12,7 @@ from replay.stages.frame import Stage, Workspace
 from replay.stages.settings import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.
-_HOURGLASS_METHODS = {"stiffness": 4, "viscous": 1}
+_HOURGLASS_METHODS = {"stiffness": 4, "selective": 4, "viscous": 1}
 _EVERYTHING = "all_parts"
 
 

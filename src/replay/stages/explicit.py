@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from replay.controls import load_controls
-from replay.files import write_json
+from replay.errors import InputError
+from replay.files import hold_folder, write_json
 from replay.solver import solve
+from replay.solver.arrays import WHERE
 from replay.stages.controlled import build_task
 from replay.stages.solver_model import open_model
 
@@ -40,12 +44,13 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
         See `replay.solver.solve`.
     """
     settings = load_controls(controls)
-    task = build_task(open_model(model), settings, controls)
-    for note in task.notes:
-        print(note)
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "controls.json", settings.model_dump(mode="json"))
-    summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
+    with _told_of(controls):
+        task = build_task(open_model(model), settings, controls)
+        for note in task.notes:
+            print(note)
+        with hold_folder(out, "this run"):
+            write_json(out / "controls.json", settings.model_dump(mode="json"))
+            summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
     low, high = summary.energy_ratio_range
     energies = summary.energies
     print(
@@ -55,3 +60,14 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
         f"    results: {out}"
     )
     return 0
+
+
+@contextlib.contextmanager
+def _told_of(controls: Path) -> Iterator[None]:
+    """Name the user's file where the solver, which knows none, refuses a problem."""
+    try:
+        yield
+    except InputError as error:
+        if error.file != WHERE:
+            raise
+        raise InputError(controls, error.found, expected=error.expected, mend=error.mend, column=error.column) from None

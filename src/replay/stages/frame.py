@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import platform
 import shutil
 from collections.abc import Iterable, Sequence
@@ -11,13 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from replay import __version__
-from replay.errors import InputError, ReplayError
+from replay.errors import InputError
+from replay.files import LOCK, hold_folder
 from replay.manifest import NAME, Artifact, StageManifest, check_manifest, write_manifest
 
 if TYPE_CHECKING:
     from replay.gates import Gate
-
-_LOCK = ".lock"
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,7 @@ class Stage:
             self._before[stage] = check_stage(workspace, stage)
         self._inputs: dict[str, Path] = {}
         self._artifacts: list[Artifact] = []
-        self._keep = (*keep, _LOCK)
+        self._keep = (*keep, LOCK)
         self._begun = False
         self._lock()
 
@@ -92,17 +90,8 @@ class Stage:
                 shutil.rmtree(path) if path.is_dir() else path.unlink()
 
     def _lock(self) -> None:
-        """Refuse a second writer: a killed workflow can leave its solver running. The kernel drops the lock."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._held = (self.folder / _LOCK).open("w")
-        try:
-            fcntl.flock(self._held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            message = (
-                f"{self.folder}: another process is writing this stage\n"
-                "    mend: wait for it, or end it (a killed workflow can leave its solver running)"
-            )
-            raise ReplayError(message) from None
+        """Refuse a second writer."""
+        self._held = hold_folder(self.folder, "this stage")
 
     @property
     def stopped_by(self) -> str | None:

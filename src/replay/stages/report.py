@@ -75,7 +75,7 @@ def collect(stage: Stage) -> ReportInput:
         "gates": _gates(stage, limits),
         "gate_facts": {
             name: {"title": facts.title, "source": facts.source, "stops_run": facts.stops_run}
-            for name, facts in limits.gates.items()
+            for name, facts in limits.protocol.items()
         },
         "stages": _stages(stage),
         "t0_s": quality["driving_t0_s"],

@@ -3,15 +3,31 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
-from replay import bundle, models
+import numpy as np
+
+from replay import models
 from replay.errors import InputError
 from replay.files import read_json, write_text
 from replay.gates import Gate, Limits, read_gate
 from replay.motion import synthesise
-from replay.motion.synthetic import Preset
+from replay.motion.digitise import digitise, digitising_report, write_digitised
+from replay.motion.synthetic import (
+    TEN,
+    Flaws,
+    Impact,
+    Motion,
+    Preset,
+    RecordedMotion,
+    SyntheticCamera,
+    draw_impact,
+    film,
+    footage_play,
+)
+from replay.motion.tracking import Following
 from replay.play import load_play, play_schema_text
 from replay.stages.verdict import ALL_GATE_FILES
 
@@ -38,7 +54,7 @@ def show_verdict(results: Path) -> int:
                 judged = read_gate(results / stage / file, limits)
                 found[judged.name] = judged
     print(f"\n{results.name}: {verdict['status'].upper()}\n")
-    for name, facts in limits.gates.items():
+    for name, facts in limits.protocol.items():
         gate = found.get(name)
         word = gate.verdict if gate else "not reached"
         print(f"  {_coloured(word):<20} {facts.title} [{name}]")
@@ -59,23 +75,9 @@ def _coloured(word: str) -> str:
     return f"\033[{_COLOURS[word]}m{word}\033[0m" + " " * (11 - len(word)) if sys.stdout.isatty() else word
 
 
-def verify_bundle(path: Path) -> int:
-    """Verify a bundle and say what was verified; a bad one raises, naming its first bad file."""
-    print(bundle.verify(path).text())
-    return 0
-
-
-def compare_bundles(old: Path, new: Path) -> int:
-    """Compare two runs; 0 when they agree, each artifact by its class."""
-    comparison = bundle.compare(old, new)
-    print(comparison.text())
-    return 0 if comparison.agree else 1
-
-
 def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
     """Write one of the synthetic plays, with its truth and its description, into a new folder."""
-    if into.exists() and (not into.is_dir() or any(into.iterdir())):
-        raise InputError(into, "the folder is not empty", mend="name a new folder")
+    _refuse_full(into)
     shipped = Path(__file__).resolve().parents[3] / "config" / "plays" / kind / "play.yaml"
     if not shipped.is_file():
         raise InputError(shipped, "the shipped play is not here", mend="run from a checkout of the project")
@@ -84,6 +86,71 @@ def write_synthetic_play(kind: str, into: Path, seed: int | None) -> int:
     write_text(into / "play.yaml", text)
     load_play(into)
     print(f"{into}: a play of kind {kind} with its truth\nrun it: make run PLAY={into.name} PLAYS={into.parent}")
+    return 0
+
+
+def _refuse_full(into: Path) -> None:
+    if into.exists() and (not into.is_dir() or any(into.iterdir())):
+        raise InputError(into, "the folder is not empty", mend="name a new folder")
+
+
+def write_synthetic_footage(asked: dict[str, Any]) -> int:
+    """Write a play of any footage, with its truth.
+
+    Parameters
+    ----------
+    asked
+        Arguments of ``replay synth footage`` by name.
+    """
+    into, seed = asked["into"], asked["seed"] or 0
+    _refuse_full(into)
+    at = (0.0, asked["distance"], 0.0)
+    motion: Motion = replace(Impact(family=asked["family"]), position_m=at)
+    if asked["motion"] is not None:
+        motion = RecordedMotion.read(asked["motion"], position_m=at)
+    elif asked["draw"]:
+        motion = draw_impact(np.random.default_rng(seed), asked["family"], at)
+    half = max(round(0.15 * asked["fps"]), 9)
+    camera = SyntheticCamera(
+        asked["fps"],
+        -half,
+        half,
+        (1920, 1080),
+        asked["focal"],
+        asked["click_sigma"],
+        landmarks=TEN[: asked["landmarks"]],
+        zoom_per_s=asked["zoom"],
+        pan_rad_per_s=asked["pan"],
+        row_time_s=asked["row_time"],
+        static_points_m={} if asked["pan"] == 0.0 else _background(asked["distance"], asked["focal"]),
+    )
+    flaws = Flaws(blur_share=asked["blur"], occluded_share=asked["occlusion"], outlier_share=asked["outliers"])
+    footage = film(motion, camera, seed=seed, flaws=flaws)
+    footage_play(motion, footage, footage.settings(), into.name).write(into)
+    load_play(into)
+    print(f"{into}: a play with its truth\nrun it: make run PLAY={into.name} PLAYS={into.parent}")
+    return 0
+
+
+def _background(distance_m: float, focal_px: float) -> dict[str, tuple[float, float, float]]:
+    """Three static points behind the head, inside the picture."""
+    reach = 2.0 * distance_m / focal_px
+    return {
+        "S1": (-400.0 * reach, 2.0 * distance_m, 200.0 * reach),
+        "S2": (350.0 * reach, 2.0 * distance_m, 250.0 * reach),
+        "S3": (100.0 * reach, 2.0 * distance_m, -300.0 * reach),
+    }
+
+
+def digitise_video(
+    video: Path, seeds: Path, out: Path, frames: tuple[int | None, int | None], click_sigma_px: float, patch_px: int
+) -> int:
+    """Follow clicked landmarks through a video, write the click table, say what was lost and where to click again."""
+    how = Following(patch_px=patch_px | 1)
+    found, facts = digitise(video, seeds, first=frames[0], last=frames[1], how=how)
+    write_digitised(out, found, click_sigma_px)
+    print(digitising_report(found, facts))
+    print(f"{out}: a click table for `source.clicks` of a play")
     return 0
 
 
