@@ -57,6 +57,10 @@ GOOD: dict[str, dict[str, Any]] = {
         "angular_cutoff_over_nyquist": 0.67,
         "focal_cutoff_over_nyquist": 0.1,
         "helmet_to_com_m": 0.06,
+        "posterior_flip_margin": 40.0,
+        "posterior_peak_over_null": 9.0,
+        "peak_omega_resolved": True,
+        "bands_calibrated": True,
     },
     "wearable": {
         "sampling_rate_hz": 6400.0,

@@ -83,6 +83,8 @@ class ReportInput:
         The impact reference and the analysis window (start, end), on the clock of `kinematics`.
     kinematics
         kinematics.csv.
+    peaks
+        peaks.csv: both modes, where the motion comes from clicks.
     driver, applied
         driver_6dof.csv, and the skull's motion in the model with the same headings.
     fidelity
@@ -137,6 +139,7 @@ class ReportInput:
     t0_s: float | None = None
     window_s: tuple[float, float] | None = None
     kinematics: pd.DataFrame | None = None
+    peaks: pd.DataFrame | None = None
     driver: pd.DataFrame | None = None
     applied: pd.DataFrame | None = None
     fidelity: Row | None = None
