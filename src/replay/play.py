@@ -287,6 +287,19 @@ class Window(Setting):
     )
 
 
+class ReconstructionChoice(Setting):
+    """Which of the two reconstructions drives the replay; both are always made and shown."""
+
+    mode: Literal["protocol", "posterior"] = Field(
+        default="protocol",
+        description="`protocol`: the article's method, comparable between laboratories; `posterior`: a motion from the "
+        "middle of the batch estimate's posterior, which peaks between the frames.",
+    )
+    ensemble: Annotated[int, Field(ge=0, le=200)] = Field(
+        default=0, description="Number of drivers drawn from the posterior, for an ensemble of replays; 0 for none."
+    )
+
+
 class Helmet(Setting):
     """The physical helmet that was worn."""
 
@@ -299,7 +312,8 @@ class Helmet(Setting):
         default=0.010, description="Agreement asked of the finite-element helmet's CG [m]."
     )
     offset_m: Vector3 = Field(
-        default=(0.0, 0.0, 0.0), description="Displacement of the helmet from its nominal seat, head axes [m]."
+        default=(0.0, 0.0, 0.0),
+        description="Displacement of the helmet from its nominal seat, head axes [m]; for a helmet seated by contact.",
     )
     padding: str = Field(default="not recorded", description="Padding set and size (protocol 1.2).")
     chinstrap: str = Field(default="not recorded", description="Routing of the chin strap (protocol 1.2).")
@@ -321,17 +335,29 @@ class ModelChoice(Setting):
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
     resolution: Literal["tiny", "coarse"] = Field(default="coarse", description="Mesh resolution.")
+    brain_material: Literal["brain_isv", "viscohyperelastic"] = Field(
+        default="brain_isv",
+        description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
+    )
     helmet_structure: Literal["rigid", "deformable"] = Field(
         default="rigid",
         description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "
         "hourglass gate refuses at these resolutions.",
+    )
+    helmet_seat: Literal["shared_nodes", "contact"] = Field(
+        default="shared_nodes",
+        description="Pads and chin cup on the scalp: `shared_nodes` joins them to it; `contact` lets them slide and "
+        "lift off, held by chin straps: contact does not pass the numerics gate on this helmet yet.",
     )
 
 
 class Hourglass(Setting):
     """Hourglass stabilisation, protocol 3.3.2."""
 
-    method: Literal["stiffness", "viscous"] = Field(default="stiffness", description="Form of the stabilisation.")
+    method: Literal["stiffness", "selective", "viscous"] = Field(
+        default="stiffness",
+        description="Form of the stabilisation; `selective` is a stiffness form that tells bending from twisting.",
+    )
     coefficient: Annotated[Number, Field(ge=0, le=0.3)] = Field(default=0.10, description="Coefficient.")
 
 
@@ -387,7 +413,9 @@ class SolverSettings(Setting):
     )
     hourglass: Hourglass = Field(default_factory=lambda: Hourglass(), description="Hourglass stabilisation.")
     bulk_viscosity: BulkViscosity = Field(default_factory=lambda: BulkViscosity(), description="Bulk viscosity.")
-    contact: Contact = Field(default_factory=lambda: Contact(), description="Contact.")
+    contact: Contact = Field(
+        default_factory=lambda: Contact(), description="Contact, of a helmet that is seated by it."
+    )
     mass_scaling_time_step_s: NotNegative = Field(
         default=1.92e-7, description="Time step that mass scaling holds; 0 turns it off [s]."
     )
@@ -417,6 +445,9 @@ class Play(Setting):
         default="angular", description="Impact reference: peak angular or linear acceleration (protocol 2.4)."
     )
     window: Window = Field(default_factory=lambda: Window(), description="The time that is replayed.")
+    reconstruction: ReconstructionChoice = Field(
+        default_factory=lambda: ReconstructionChoice(), description="Which reconstruction drives the replay."
+    )
     helmet: Helmet = Field(default_factory=lambda: Helmet(), description="The physical helmet.")
     model: ModelChoice = Field(default_factory=lambda: ModelChoice(), description="The finite-element model.")
     solver: SolverSettings = Field(default_factory=lambda: SolverSettings(), description="Controls of the solver.")
@@ -432,6 +463,27 @@ class Play(Setting):
         "hash and reason instead.",
     )
     _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="after")
+    def _only_a_helmet_that_touches_can_be_moved(self) -> Play:
+        if any(self.helmet.offset_m) and self.model.helmet_seat != "contact":
+            refuse(
+                "helmet.offset_m moves a helmet that shares nodes with the head",
+                "no offset, or `model.helmet_seat: contact`",
+                "remove `offset_m`, or seat the helmet by contact",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _a_wearable_has_no_posterior(self) -> Play:
+        asked = self.reconstruction.mode == "posterior" or self.reconstruction.ensemble > 0
+        if self.source.kind == "wearable" and asked:
+            refuse(
+                "reconstruction asks for the posterior of a wearable's record",
+                "clicks: a wearable is read as it is",
+                "remove the block `reconstruction`",
+            )
+        return self
 
     @property
     def folder(self) -> Path:

@@ -261,7 +261,7 @@ def test_both_solvers_of_the_multipliers_agree() -> None:
     ends = []
     for solver in ("l1_jacobi", "projected_cg"):
         blocks = [
-            Block((4, 4, 3), (0.04, 0.04, 0.03), (0.003, 0.002, 0.0152), SOFT, (1.0, 0.5, -3.0), turn_deg=(4, -3, 20)),
+            Block((4, 4, 3), (0.04, 0.04, 0.03), (0.003, 0.002, 0.0162), SOFT, (1.0, 0.5, -3.0), turn_deg=(4, -3, 20)),
             Block((5, 5, 3), (0.06, 0.06, 0.03), (0, 0, -0.0165), SOFT),
         ]
         contact = ContactControls(friction=0.3, solver=solver, most_iterations=500, tolerance=1e-6)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from material_point import Point, turned
 
-from replay.solver import LAWS, Controls, Material, Problem, SolverPart
+from replay.solver import LAWS, Controls, Material, Problem, SolverPart, solve
 from replay.solver.blocks import structured_block
 from replay.solver.integrator import Integrator
+from replay.solver.vtkhdf import read_states
 
 MODULUS, POISSON, YIELD = 70e9, 0.3, 300e6
 SHEAR = MODULUS / 2.6
@@ -171,3 +174,28 @@ def test_unused_points_of_the_curve_change_nothing() -> None:
     many = kind(MODULUS, POISSON, YIELD, 1e9, (0.1, 0.2), (YIELD + 1e8, YIELD + 2e8))
     assert few.constants()[10] == pytest.approx(1 / (3 * SHEAR + 1e9))
     assert many.constants()[11:] == pytest.approx((0.0,) * 7, abs=1e-20)
+
+
+def test_plastic_strain_and_work_are_in_the_files_of_a_run(tmp_path: Path) -> None:
+    nodes, hexes = structured_block((4, 2, 2), (0.02, 0.01, 0.01))
+    metal = {"youngs_modulus_pa": MODULUS, "poisson_ratio": POISSON, "yield_stress_pa": YIELD}
+    parts = (
+        SolverPart(1, "metal", Material("metal", "elastic_plastic", 2700.0, metal)),
+        SolverPart(
+            2, "hard", Material("hard", "elastic", 2700.0, {"youngs_modulus_pa": MODULUS, "poisson_ratio": 0.3})
+        ),
+    )
+    part = (nodes[hexes].mean(axis=1)[:, 0] > 0.01).astype(int)
+    velocity = np.where(nodes[:, :1] > 0.01, -80.0, 80.0) * [1.0, 0.0, 0.0]
+    controls = Controls(
+        1e-5, history_interval_s=2e-6, plot_interval_s=5e-6, mass_scaling_time_step_s=0.0, time_step_floor_s=0.0
+    )
+    solve(Problem(nodes, hexes, part, parts, controls, initial_velocity=velocity), tmp_path, progress=None)
+    energy = pd.read_csv(tmp_path / "energy.csv")
+    assert energy["plastic_J"].iloc[0] == 0
+    assert (energy["plastic_J"].diff().dropna() >= 0).all()
+    assert 0 < energy["plastic_J"].iloc[-1] < energy["internal_J"].iloc[-1]
+    with read_states(tmp_path / "states.vtkhdf") as states:
+        strain = states.field("equivalent_plastic_strain", len(states) - 1)
+    assert strain[part == 0].max() > 1e-3
+    assert (strain[part == 1] == 0).all()

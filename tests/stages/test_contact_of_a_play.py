@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from replay.errors import InputError
 from replay.files import read_json
 from replay.models import Model, build_model, read_model
 from replay.play import Contact, FrictionPair
@@ -19,10 +20,10 @@ from replay.stages.problem import chin_straps, contact_of, helmet_problem, resti
 
 @pytest.fixture(scope="module")
 def tiny() -> Model:
-    return build_model("nfl", "tiny")
+    return build_model("nfl", "tiny", seat="contact")
 
 
-def assembled(repository: Path, folder: Path, offset: float) -> Workspace:
+def assembled(repository: Path, folder: Path, offset: float, seat: str = "contact") -> Workspace:
     """The demo's assembly at `tiny`, its helmet moved forward."""
     play = folder / "plays" / "demo"
     play.mkdir(parents=True)
@@ -30,7 +31,9 @@ def assembled(repository: Path, folder: Path, offset: float) -> Workspace:
         text = file.read_text(encoding="utf-8")
         if file.name == "play.yaml":
             text = text.replace("  model: classic\n", f"  model: classic\n  offset_m: [{offset}, 0.0, 0.0]\n", 1)
+            text = text.replace("helmet_seat: shared_nodes", f"helmet_seat: {seat}")
             assert "offset_m" in text
+            assert f"helmet_seat: {seat}" in text
         (play / file.name).write_text(text, encoding="utf-8")
     workspace = Workspace("demo", folder / "plays", folder / "results")
     settings.run(workspace, resolution="tiny")
@@ -88,3 +91,15 @@ def test_the_flying_helmet_keeps_its_parts_together(tiny: Model) -> None:
         run.kick(dt, drift=False)
         run.drift(dt, run.time_s + dt)
     assert np.abs(run.nodal[:, 4:7] - [0.4, 0.0, 0.0]).max() < 1e-9
+
+
+def test_a_helmet_on_the_scalps_nodes_asks_for_no_contact_and_cannot_be_moved(
+    repository: Path, tmp_path: Path, tiny: Model
+) -> None:
+    joined = build_model("nfl", "tiny")
+    problem = helmet_problem(joined, 0.4, Controls(1e-3), Contact())
+    assert problem.contact is None
+    assert (problem.straps, problem.rigid_sets) == ((), ())
+    assert helmet_problem(tiny, 0.4, Controls(1e-3), Contact()).contact is not None
+    with pytest.raises(InputError, match="shares nodes with the head"):
+        assembled(repository, tmp_path, 1e-3, seat="shared_nodes")

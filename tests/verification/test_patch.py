@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from marching import March, controls, elastic, one_part
+from scipy.spatial.transform import Rotation
 
+from replay.solver import Material
 from replay.solver.blocks import structured_block
 from replay.solver.problem import gradients
 
@@ -111,3 +113,62 @@ def test_energy_identity_closes_step_by_step(report: Callable[..., None], method
     assert abs(energies.bulk_viscosity) > 1e-3 * energies.initial
     assert abs(energies.external_work) > 1e-3 * energies.initial
     report(f"energy ledger, {method} hourglass control", "worst residual of a step, relative", 0.0, max(closure), 1e-10)
+
+
+def test_energy_identity_closes_with_every_account_at_work(report: Callable[..., None]) -> None:
+    nodes, hexes = structured_block((5, 3, 3), (0.5, 0.3, 0.3))
+    nodes = nodes + 0.012 * np.sin(nodes @ [9.0, 7.0, 5.0])[:, None] * [1.0, -0.7, 0.4]
+    rng = np.random.default_rng(2)
+    velocity = rng.normal(size=nodes.shape)
+    metal = Material(
+        "metal", "elastic_plastic", 1000.0,
+        {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3, "yield_stress_pa": 5e3, "hardening_modulus_pa": 1e5},
+    )  # fmt: skip
+    plain = March(one_part(nodes, hexes, metal, controls(1.0)))
+    # the shortest third of the elements gets mass
+    steps = np.zeros(len(hexes))
+    plain.run.forces()
+    plain.run.groups[0].scatter(plain.run.groups[0].step, steps)
+    target = 0.9 * float(np.quantile(steps, 0.33))
+    settings = controls(1.0, mass_scaling_time_step_s=target, gravity_m_per_s2=(0.0, 0.0, -9.81))
+    march, closure = March(one_part(nodes, hexes, metal, settings, initial_velocity=velocity)), []
+    march.until(0.02, lambda m: closure.append(abs(m.run.energies().closure)))
+    energies = march.run.energies(march.run.velocities())
+    for account in ("internal", "plastic", "hourglass", "bulk_viscosity", "added_mass_kinetic", "external_work"):
+        assert abs(getattr(energies, account)) > 1e-3 * energies.initial, account
+    assert energies.plastic < energies.internal
+    report("energy ledger, plasticity and added mass", "worst residual of a step, relative", 0.0, max(closure), 1e-10)
+
+
+@pytest.mark.parametrize("steps", [60, 10_000])
+def test_a_prestressed_hex_spun_about_a_diagonal_comes_round(report: Callable[..., None], steps: int) -> None:
+    rng = np.random.default_rng(6)
+    nodes = OUTER + 0.2 * rng.uniform(-1, 1, (8, 3))
+    stress = rng.normal(size=(1, 6)) * 1e3
+    march = March(one_part(nodes, np.arange(8)[None], elastic(1e6, 0.3, 1e3), controls(1.0), initial_stress=stress))
+    volume = gradients(nodes, np.arange(8)[None])[1][0]
+    group = march.run.groups[0]
+    group.hourglass[:] = rng.normal(size=(12, 1))
+    start = march.run.element_values("hourglass", 12).reshape(4, 3)
+    first, work, worst = march.run.nodal[:, :3].copy(), 0.0, [0.0, 0.0, 0.0]
+    xx, yy, zz, xy, yz, zx = stress[0]
+    given = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+    for k in range(1, steps + 1):
+        turn = Rotation.from_rotvec(2 * np.pi * k / steps * np.ones(3) / np.sqrt(3)).as_matrix()
+        place = first @ turn.T
+        march.run.nodal[:, 4:7] = (place - march.run.nodal[:, :3]) / 1e-3
+        march.run.nodal[:, :3] = place
+        group.forces(march.run.nodal, 1e-3)
+        work += np.abs(group.work).sum()
+        if k % (steps // 20) == 0:
+            xx, yy, zz, xy, yz, zx = march.stress[0]
+            now = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+            hourglass = march.run.element_values("hourglass", 12).reshape(4, 3)
+            worst[0] = max(worst[0], np.abs(now - turn @ given @ turn.T).max() / np.abs(given).max())
+            worst[1] = max(worst[1], np.abs(hourglass - start @ turn.T).max() / np.abs(start).max())
+            worst[2] = max(worst[2], abs(gradients(march.u + nodes, np.arange(8)[None])[1][0] / volume - 1))
+    name = f"prestressed crooked hex, a turn about (1, 1, 1) in {steps} steps"
+    report(name, "stress against R s R^T, relative", 0.0, worst[0], 1e-10)
+    report(name, "hourglass forces against R q, relative", 0.0, worst[1], 1e-10)
+    report(name, "volume ratio", 1.0, 1.0 + worst[2], 1e-10)
+    report(name, "work, over stress and volume", 0.0, work / np.abs(given).max(), 1e-10)

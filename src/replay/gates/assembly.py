@@ -8,7 +8,7 @@ from typing import Any
 from replay.gates.limits import Limits
 from replay.gates.model import Gate, Judge
 
-NO_CONTACT = "no contact in this model"
+NO_CONTACT = "no contact in this model: pads share nodes with scalp and shell"
 
 CHECKS = (
     "helmet_mass_difference_kg",

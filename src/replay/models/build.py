@@ -14,7 +14,7 @@ from replay.models.helmet import helmet_mesh
 from replay.models.helmet_layout import PADS, helmet_layout
 from replay.models.mass import mass_properties
 from replay.models.materials import MATERIAL_OF_ROLE, load_materials
-from replay.models.model import Model, Part
+from replay.models.model import GRID_DECIMALS, Model, Part
 from replay.models.ogrid import RESOLUTIONS, TISSUES, head_mesh
 from replay.models.quality import hex_volumes
 from replay.models.regions import REGION_NAMES, label_regions
@@ -30,11 +30,19 @@ SET_IDS = {
     "skull": 60000099,
 }
 NOTES = (
-    "pads and chin cup touch the scalp by contact; pads share nodes with each other and with the shell",
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
-    "straps are straight cables between chin cup and shell that touch nothing; the cup's outer face is its hard shell",
     "head surfaces are analytic (ellipsoids), not a person's anatomy",
 )
+SEAT_NOTES = {
+    "shared_nodes": (
+        "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
+        "straps are not modelled; their anchors are node sets",
+    ),
+    "contact": (
+        "pads and chin cup touch the scalp by contact; pads share nodes with each other and with the shell",
+        "straps are straight cables from chin cup to shell that touch nothing; the cup's outer face is its hard shell",
+    ),
+}
 STRUCTURE_ROLES = ("shell", "facemask")
 STRUCTURE_NOTES = {
     "rigid": (
@@ -53,6 +61,8 @@ def build_model(
     *,
     helmet: bool = True,
     helmet_structure: str = "rigid",
+    brain: str = "brain_isv",
+    seat: str = "shared_nodes",
 ) -> Model:
     """Build head and helmet.
 
@@ -68,6 +78,10 @@ def build_model(
         False for a bare head.
     helmet_structure
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
+    brain
+        Law of the brain: ``brain_isv`` or ``viscohyperelastic``.
+    seat
+        ``shared_nodes``: pads and chin cup share the scalp's nodes; ``contact``: they touch it, held by chin straps.
 
     Returns
     -------
@@ -77,10 +91,13 @@ def build_model(
     Raises
     ------
     ValueError
-        For an unknown preset, resolution or structure, or a mass that is not positive.
+        For an unknown preset, resolution, structure or seat, or a mass that is not positive.
     """
     if helmet_structure not in STRUCTURE_NOTES:
         message = f"no helmet structure {helmet_structure!r}; there are {', '.join(STRUCTURE_NOTES)}"
+        raise ValueError(message)
+    if seat not in SEAT_NOTES:
+        message = f"no helmet seat {seat!r}; there are {', '.join(SEAT_NOTES)}"
         raise ValueError(message)
     if resolution not in RESOLUTIONS:
         message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
@@ -90,8 +107,9 @@ def build_model(
     if not target > 0:
         message = f"a helmet of {target} kg"
         raise ValueError(message)
-    nodes, hexes, names, mounts, cup = _mesh(head, resolution, helmet)
+    nodes, hexes, names, mounts, cup = _mesh(head, resolution, seat if helmet else None)
     nodes, moved = relocate_worst_nodes(nodes, hexes, target=_QUALITY_TARGET)
+    nodes = np.round(nodes, GRID_DECIMALS)
     parts = tuple(part for part in part_table() if part.name in set(names.tolist()))
     index = {part.name: k for k, part in enumerate(parts)}
     element_part = np.array([index[name] for name in names.tolist()], dtype=np.int32)
@@ -100,7 +118,7 @@ def build_model(
     regions = np.zeros(len(hexes), dtype=np.int32)
     in_brain = element_part == index["brain"]
     regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
-    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target)
+    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target, brain)
     if helmet_structure == "rigid":
         for part in parts:
             if part.role in STRUCTURE_ROLES:
@@ -108,10 +126,11 @@ def build_model(
     density = np.array([materials[part.material]["density_kg_per_m3"] for part in parts])[element_part]
     in_head = np.array([part.assembly == "head" for part in parts])[element_part]
     cg = mass_properties(nodes, hexes[in_head], density[in_head]).cg_m
+    cg = np.round(cg, GRID_DECIMALS)
     cg[1] = 0.0  # the head is symmetric; the sum of its elements only nearly so
     sets, set_ids = _part_sets(parts)
     return Model(
-        nodes=nodes - cg,
+        nodes=np.round(nodes - cg, GRID_DECIMALS) + 0.0,  # no negative zeros
         node_ids=_numbers(hexes, in_head, len(nodes)),
         hexes=hexes.astype(np.int32),
         element_ids=_element_ids(in_head),
@@ -122,7 +141,7 @@ def build_model(
         part_sets=sets,
         part_set_ids=set_ids,
         materials=materials,
-        node_sets=_node_sets(nodes, mounts, cup, hexes, element_part, index),
+        node_sets=_node_sets(nodes, mounts, cup, hexes, element_part, index, seat),
         info={
             "preset": preset,
             "preset_title": head.title,
@@ -136,8 +155,9 @@ def build_model(
             "guard_moved_nodes": int(moved),
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
             "helmet_structure": helmet_structure if helmet else None,
-            "strap": load_data("helmet.yaml")["strap"] if helmet else None,
-            "notes": [*NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
+            "helmet_seat": seat if helmet else None,
+            "notes": [*SEAT_NOTES[seat], *NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
+            **({"strap": load_data("helmet.yaml")["strap"]} if helmet and seat == "contact" else {}),
         },
     )
 
@@ -155,17 +175,17 @@ def part_table() -> tuple[Part, ...]:
 
 
 def _mesh(
-    head: HeadPreset, resolution: str, with_helmet: bool
+    head: HeadPreset, resolution: str, seat: str | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """Nodes, hexes, part name of each hex, mounts, outer nodes of the chin cup."""
+    """Nodes, hexes, part name of each hex, mounts, outer nodes of the chin cup; a bare head where there is no seat."""
     setting, helmet = RESOLUTIONS[resolution], load_data("helmet.yaml")
     lattice = cube_lattice(setting.divisions)
     layout = helmet_layout(lattice, helmet)
     inner = head_mesh(lattice, head.surfaces, setting, layout.directions, head.least_thickness_m)
     names = np.array(TISSUES)[inner.tissue].astype("U32")
-    if not with_helmet:
+    if seat is None:
         return inner.nodes, inner.hexes, names, {}, np.zeros(0, dtype=int)
-    outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet)
+    outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet, seat)
     mask = facemask_mesh(outer.nodes, outer.edge_quads, head.surfaces.scalp, helmet, setting.facemask_step_m)
     names = np.concatenate([names, outer.part, np.full(len(mask.hexes), "facemask")])
     cup = np.unique(outer.hexes[outer.part == "chin_cup"][:, 4:])
@@ -179,6 +199,7 @@ def _calibrated(
     parts: tuple[Part, ...],
     head: HeadPreset,
     helmet_mass_kg: float,
+    brain: str,
 ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, float]]]:
     """Densities that give every head part its mass and the helmet its own; the state before and after.
 
@@ -187,7 +208,7 @@ def _calibrated(
     and paint that are not meshed.
     """
     volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
-    library = load_materials()
+    library = load_materials(brain)
     nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
     before = volume * nominal
     of_helmet = np.array([p.assembly == "helmet" for p in parts])
@@ -247,11 +268,14 @@ def _node_sets(
     hexes: np.ndarray,
     element_part: np.ndarray,
     index: dict[str, int],
+    seat: str,
 ) -> dict[str, np.ndarray]:
     """Mounts of the facemask, and where the chin strap goes: outer corners of the cup, lower edge of the shell."""
     if "shell" not in index:
         return {}
-    sets = {f"facemask_mount_{name}": rows for name, rows in mounts.items()} | {"chin_cup_shell": cup}
+    sets = {f"facemask_mount_{name}": rows for name, rows in mounts.items()}
+    if seat == "contact":
+        sets["chin_cup_shell"] = cup
     shell = np.unique(hexes[element_part == index["shell"]])
     for side, sign in (("left", 1), ("right", -1)):
         sets[f"chin_cup_strap_{side}"] = cup[[_furthest(nodes[cup], np.array([0.0, sign, 0.0]))]]

@@ -47,11 +47,11 @@ def helmet_mesh(
     scalp: RadialSurface,
     resolution: Resolution,
     helmet: dict[str, Any],
+    seat: str,
 ) -> HelmetMesh:
     """Stand pads and shell on the scalp.
 
-    Pads and chin cup touch the scalp with nodes of their own: contact holds them. Between pads a column is empty from
-    scalp to shell.
+    Between pads a column is empty from scalp to shell.
 
     Parameters
     ----------
@@ -65,6 +65,8 @@ def helmet_mesh(
         Layers of comfort and energy pads.
     helmet
         ``data/helmet.yaml``.
+    seat
+        ``shared_nodes``: pads and chin cup stand on the scalp's nodes; ``contact``: each on nodes of its own there.
     """
     d = layout.directions
     skin = head.nodes[head.scalp_nodes]
@@ -73,7 +75,7 @@ def helmet_mesh(
     base = np.maximum(liner(d), np.sqrt(np.einsum("ij,ij->i", skin, skin)))
     stretch = ray_stretch(liner, d)
     builder = _Builder(head.nodes, lattice.quads)
-    levels = [builder.level(skin.copy())]
+    levels = [_sole(builder, head, seat)]
     start = np.sqrt(np.einsum("ij,ij->i", skin, skin))
     for name, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy), ("shell", 1)):
         base = base + stretch * thickness[name]
@@ -94,8 +96,13 @@ def helmet_mesh(
     edge_quads = np.stack([inner[rim[:, 0]], inner[rim[:, 1]], outer[rim[:, 1]], outer[rim[:, 0]]], axis=1)
     reach = ray_stretch(scalp, d) * helmet["chin"]["thickness_m"]
     cup = builder.level(skin + d * reach[:, None])
-    builder.extrude(builder.level(skin.copy()), cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+    builder.extrude(_sole(builder, head, seat), cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
     return builder.finish(edge_quads)
+
+
+def _sole(builder: _Builder, head: HeadMesh, seat: str) -> np.ndarray:
+    """Nodes on which something stands on the scalp: the scalp's, or new ones at the same places."""
+    return builder.level(head.nodes[head.scalp_nodes]) if seat == "contact" else head.scalp_nodes
 
 
 class _Builder:

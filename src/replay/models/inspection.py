@@ -12,6 +12,8 @@ from replay.models.model import Model
 from replay.models.quality import hex_volumes, scaled_jacobians
 
 PAD_SETS = ("H1_pads_set1", "H1_pads_set2")
+FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), (60009020, "chin_cup", 2))
+"""Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
 
 
 def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
@@ -102,6 +104,11 @@ def helmet_inspection(model: Model, *, helmet_cg_in_datum_m: np.ndarray | None =
         "removed_not_wedge": 0,
         "missing_interfaces": len(missing),
         "missing_interfaces_detail": ", ".join(missing),
+        "unusable_parts": 0,
+        "colliding_ids": len(model.node_ids)
+        + len(model.element_ids)
+        - len(np.unique(model.node_ids))
+        - len(np.unique(model.element_ids)),
         "min_volume_m3": float(hex_volumes(model.nodes, hexes).min()),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, hexes).min()),
     }
@@ -153,6 +160,11 @@ def assembly_inspection(
         part.name for part in model.parts if not PID_BLOCKS[part.assembly][0] < part.pid <= PID_BLOCKS[part.assembly][1]
     ]
     loose = unconnected_parts(model)
+    unresolved = [
+        f"{pid}-{other}"
+        for pid, other, _ in FRICTION_PAIRS
+        if pid not in pids or not (model.part_sets.get(other) or other in {part.name for part in model.parts})
+    ]
     mass: float | str = "no mass of the physical helmet is given"
     if helmet_mass_kg is not None:
         mass = abs(helmet.mass_kg - helmet_mass_kg)
@@ -167,6 +179,8 @@ def assembly_inspection(
         "parts_outside_block_detail": ", ".join(outside),
         "unconnected_parts": len(loose),
         "unconnected_parts_detail": ", ".join(loose),
+        "unresolved_friction_pairs": len(unresolved),
+        "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
 
@@ -176,8 +190,10 @@ def unconnected_parts(model: Model) -> list[str]:
     pairs = np.unique(np.stack([np.repeat(model.element_part, 8), model.hexes.ravel()], axis=1), axis=0)
     users = np.bincount(pairs[:, 1], minlength=len(model.nodes))
     tied = np.unique(pairs[users[pairs[:, 1]] > 1, 0])
-    strapped = [rows for name, rows in model.node_sets.items() if name.startswith("chin_cup_strap")]
-    held = np.unique(pairs[np.isin(pairs[:, 1], np.concatenate([np.empty(0, int), *strapped])), 0])
+    ends = [np.empty(0, int)]
+    if model.info.get("helmet_seat") == "contact":
+        ends += [rows for name, rows in model.node_sets.items() if name.startswith("chin_cup_strap")]
+    held = pairs[np.isin(pairs[:, 1], np.concatenate(ends)), 0]
     return [part.name for k, part in enumerate(model.parts) if k not in tied and k not in held]
 
 

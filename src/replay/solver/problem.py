@@ -52,7 +52,8 @@ class Controls:
     time_step_factor
         Share of the stable step that is used.
     hourglass_method
-        ``stiffness`` (the article's method 4) or ``viscous``.
+        ``stiffness`` (the article's method 4), ``selective`` (with 1.9 of the stiffness against bending patterns and
+        0.6 of it against twisting ones) or ``viscous``.
     hourglass_coefficient
         kappa in ``k = kappa 2 mu (B:B) / (16 V)`` for the stiffness form, or the usual coefficient of the
         viscous form with the shear wave speed.
@@ -95,12 +96,12 @@ class Controls:
         InputError
             Naming the setting.
         """
-        if self.hourglass_method not in ("stiffness", "viscous"):
+        if self.hourglass_method not in ("stiffness", "selective", "viscous"):
             raise InputError(
                 WHERE,
                 f"{self.hourglass_method!r} is no hourglass method",
                 column="controls.hourglass_method",
-                expected="stiffness or viscous",
+                expected="stiffness, selective or viscous",
             )
         for name in ("termination_time_s", "plot_interval_s", "history_interval_s"):
             if not 0 < getattr(self, name) < math.inf:

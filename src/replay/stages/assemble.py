@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,9 @@ from replay.models import Model
 from replay.play import Play
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.frame import Stage, Workspace
-from replay.stages.problem import controls_of, resting_problem, unresolved_pairs
+from replay.stages.problem import controls_of, resting_problem, seated_by_contact, unresolved_pairs
 from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.verdict import limits_of, told
 
 _MOST_PLACES = 4
 
@@ -33,8 +32,12 @@ def run(workspace: Workspace) -> str | None:
         play.model.resolution,
         helmet_mass_kg=play.helmet.mass_kg,
         helmet_structure=play.model.helmet_structure,
+        brain=play.model.brain_material,
+        seat=play.model.helmet_seat,
     )
-    model, contact = seat_helmet(stage, play, model)
+    contact = None
+    if seated_by_contact(model):
+        model, contact = seat_helmet(stage, play, model)
     print(models.summary_text(model))
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
     models.write_parts_table(stage.write("parts.csv", "parts with material, volume, mass and quality"), model)
@@ -50,8 +53,8 @@ def run(workspace: Workspace) -> str | None:
         {"helmet": helmet, "assembly": assembly},
     )
     judged = [
-        gates.helmet_gate(_told(helmet, HELMET_CHECKS), limits),
-        gates.assembly_gate(_told(assembly, ASSEMBLY_CHECKS), limits, contact=contact),
+        gates.helmet_gate(told(helmet, HELMET_CHECKS), limits),
+        gates.assembly_gate(told(assembly, ASSEMBLY_CHECKS), limits, contact=contact),
     ]
     judged[0].write(stage.write("gate_helmet.json", "gate: helmet readiness"))
     judged[1].write(stage.write("gate.json", "gate: assembly"))
@@ -87,9 +90,3 @@ def seat_helmet(stage: Stage, play: Play, model: Model) -> tuple[Model, dict[str
         "unresolved_friction_pairs": len(unresolved),
         "unresolved_friction_pairs_detail": ", ".join(unresolved),
     }
-
-
-def _told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:
-    """Entries that a gate's checks name, with their details; a detail that says nothing is left out."""
-    told = {name: facts[name] for name in checks}
-    return told | {f"{name}_detail": facts[f"{name}_detail"] for name in checks if facts.get(f"{name}_detail")}

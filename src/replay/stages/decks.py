@@ -9,10 +9,17 @@ from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.play import Play
 from replay.stages.frame import Stage, Workspace
+from replay.stages.own_deck import model_facts, node_sets, region_sets
+from replay.stages.problem import chin_straps, seated_by_contact
 from replay.stages.settings import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.
-_HOURGLASS_METHODS = {"stiffness": 4, "viscous": 1}
+_HOURGLASS_METHODS = {"stiffness": 4, "selective": 4, "viscous": 1}
+_WRITERS = (
+    ("velodyne", decks.write_velodyne),
+    ("lsdyna", decks.write_lsdyna),
+    ("openradioss", decks.write_openradioss),
+)
 _EVERYTHING = "all_parts"
 
 
@@ -26,7 +33,7 @@ def run(workspace: Workspace) -> str | None:
     driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
     deck = deck_input(play, model, driver)
     folder = stage.folder_for_many()
-    for solver, write in (("velodyne", decks.write_velodyne), ("lsdyna", decks.write_lsdyna)):
+    for solver, write in _WRITERS:
         for path in write(folder / solver, deck):
             stage.write(path.relative_to(folder).as_posix(), f"run deck for {solver}")
     return stage.finish()
@@ -66,7 +73,15 @@ def deck_input(play: Play, model: Model, driver: Kinematics) -> decks.DeckInput:
             velocity_m_per_s=driver.velocity_m_per_s,
             omega_rad_per_s=driver.omega_rad_per_s,
         ),
+        contact=seated_by_contact(model),
+        cables=tuple(
+            decks.Cable(strap.name, int(strap.nodes[0]), int(strap.nodes[-1]), strap.stiffness_n_per_m)
+            for strap in chin_straps(model)[1]
+        ),
         notes=tuple(model.info["notes"]),
+        node_sets=node_sets(model),
+        element_sets=region_sets(model),
+        facts=model_facts(model, driver.position_m[0], driver.rotation[0]),
     )
 
 

@@ -66,8 +66,15 @@ def unresolved_pairs(model: Model, contact: Contact) -> list[str]:
     return pairs + [name for name in contact.self_contact if not part_numbers(model, name)]
 
 
-def contact_of(model: Model, contact: Contact) -> ContactControls:
-    """Contact of the parts that a model has; pairs of which it lacks a side are left out."""
+def seated_by_contact(model: Model) -> bool:
+    """Whether the model's helmet touches the head, and shares no nodes with it."""
+    return bool(model.info.get("helmet_seat") == "contact")
+
+
+def contact_of(model: Model, contact: Contact) -> ContactControls | None:
+    """Contact of the parts that a model has, if it is seated by it; pairs of which it lacks a side are left out."""
+    if not seated_by_contact(model):
+        return None
     pairs = []
     for pair in contact.pairs:
         first, second = part_numbers(model, pair.first), part_numbers(model, pair.second)
@@ -86,6 +93,8 @@ def contact_of(model: Model, contact: Contact) -> ContactControls:
 
 def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
     """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
+    if not seated_by_contact(model):
+        return (), ()
     sets, data = model.node_sets, model.info["strap"]
     straps = []
     for side in ("left", "right"):
@@ -102,7 +111,7 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
     """Head and helmet with the skull driven along the play's motion.
 
     The model stands at the driver's first pose and moves as one rigid body with its first velocity, so that
-    nothing is strained before the impact. The helmet is held by contact and by its chin straps alone.
+    nothing is strained before the impact. A helmet seated by contact is held by it and by its chin straps alone.
 
     Parameters
     ----------

@@ -102,12 +102,15 @@ class Control(NamedTuple):
     ----------
     hourglass_stiffness, hourglass_viscosity
         Coefficients; one of them is zero.
+    hourglass_twist
+        Share of the stiffness that twisting patterns get; 1 treats all patterns alike.
     viscosity_quadratic, viscosity_linear
         Bulk viscosity coefficients.
     """
 
     hourglass_stiffness: float
     hourglass_viscosity: float
+    hourglass_twist: float
     viscosity_quadratic: float
     viscosity_linear: float
 
@@ -139,6 +142,12 @@ def total_deformation(reference, m):
         (r[16], r[17], r[18]),
     )
     return gradient(m, g0)
+
+
+@device
+def without_twist(rate, axis, less):
+    """Hourglass rate less a share of its component along the axis that its pattern does not vary along."""
+    return add_scaled(rate, -less * dot(axis, rate) / dot(axis, axis), axis)
 
 
 @device
@@ -224,9 +233,10 @@ def element(x, y, z, u, v, w, mass, reference, stress, hourglass, state, dt, p, 
     viscosity = control.hourglass_viscosity * soft_impedance * area * 0.25
     rates = hourglass_rates(middle, rate, velocity_gradient)
     k = stiffness * dt
-    h0 = hold(turn_and_grow(rotation, hourglass[0], k, rates[0]), moduli, area)
-    h1 = hold(turn_and_grow(rotation, hourglass[1], k, rates[1]), moduli, area)
-    h2 = hold(turn_and_grow(rotation, hourglass[2], k, rates[2]), moduli, area)
+    less = 1.0 - control.hourglass_twist
+    h0 = hold(turn_and_grow(rotation, hourglass[0], k, without_twist(rates[0], middle[0], less)), moduli, area)
+    h1 = hold(turn_and_grow(rotation, hourglass[1], k, without_twist(rates[1], middle[1], less)), moduli, area)
+    h2 = hold(turn_and_grow(rotation, hourglass[2], k, without_twist(rates[2], middle[2], less)), moduli, area)
     h3 = hold(turn_and_grow(rotation, hourglass[3], k, rates[3]), moduli, area)
     hourglass_forces = (
         add_scaled(h0, viscosity, rates[0]),

@@ -12,8 +12,9 @@ with twice the last stress for B keeps elements from being crushed flat.
 
 - Hysteresis: on unloading and reloading below the largest energy so far, ``eta = u + (1 - u) W / W_max``
   (pseudo-elastic, as in low-density foam laws); a closed cycle never returns more than it took.
-- Tension: where the volume direction of the strain is extension, phi is limited to the cut-off, gradually
-  from shear (not limited) to uniaxial extension (wholly).
+- Tension: with x = tr B / s between 0 (shear) and 1 (uniaxial extension), the energy goes from W to W_c, whose slope
+  is limited to the cut-off: ``W + w(x) (W_c - W)``, w = x^2 (3 - 2 x). T is its derivative in B, the turn of the
+  direction included, so that no closed path gives energy.
 - Rate: ``r = 1 + c ln(1 + x / x_0)`` with the closing rate x = max(-tr D, 0) averaged over a time, so that the noise
   of a single step is not amplified; unloading is not stiffened.
 
@@ -52,7 +53,7 @@ INITIAL_STRESS = False
 TOTAL_FORM = True
 #: Ramps that make up the curve.
 KNOTS = 12
-_SETTINGS = 9
+_SETTINGS = 11
 N_CONSTANTS = _SETTINGS + 2 * KNOTS
 _YIELD_KNOTS = (0.4, 1.0, 2.5)
 _CRUSH_KNOTS = (0.2, 0.35, 0.5, 0.6, 0.7, 0.8, 0.87, 0.93)
@@ -170,9 +171,19 @@ class Parameters:
             slopes[0],
             1.0 - strains[-1],
             _SOLID * stresses[-1],
+            *self._limit_of_tension(slopes, cutoff),
             0.5 * min(slopes[0], self._nominal(_HOURGLASS_STRAIN) / _HOURGLASS_STRAIN),
         )
         return (*settings, *places, *changes)
+
+    def _limit_of_tension(self, slopes: list[float], cutoff: float) -> tuple[float, float]:
+        """Strain at which the curve exceeds the cut-off, and its energy there [J/m^3]."""
+        below = [point for point in zip(*self.loading_curve()) if point[1] <= cutoff]
+        strain, stress = below[-1]
+        slope = slopes[min(len(below), len(slopes)) - 1]
+        end = strain + (cutoff - stress) / slope if slope > 0 else strain
+        path = [*below, (end, cutoff)]
+        return end, sum(0.5 * (f + g) * (b - a) for (a, f), (b, g) in pairwise(path))
 
     def elastic_moduli(self) -> tuple[float, float]:
         """Bulk and shear modulus at small strain, nu = 0 [Pa]."""
@@ -191,18 +202,18 @@ def _ramp(s, place, change):
 @device
 def _phi(s, p):
     """The curve at `s`: value, slope, integral; a sum of twelve ramps, in their order."""
-    v0, d0, w0 = _ramp(s, p[9], p[21])
-    v1, d1, w1 = _ramp(s, p[10], p[22])
-    v2, d2, w2 = _ramp(s, p[11], p[23])
-    v3, d3, w3 = _ramp(s, p[12], p[24])
-    v4, d4, w4 = _ramp(s, p[13], p[25])
-    v5, d5, w5 = _ramp(s, p[14], p[26])
-    v6, d6, w6 = _ramp(s, p[15], p[27])
-    v7, d7, w7 = _ramp(s, p[16], p[28])
-    v8, d8, w8 = _ramp(s, p[17], p[29])
-    v9, d9, w9 = _ramp(s, p[18], p[30])
-    va, da, wa = _ramp(s, p[19], p[31])
-    vb, db, wb = _ramp(s, p[20], p[32])
+    v0, d0, w0 = _ramp(s, p[11], p[23])
+    v1, d1, w1 = _ramp(s, p[12], p[24])
+    v2, d2, w2 = _ramp(s, p[13], p[25])
+    v3, d3, w3 = _ramp(s, p[14], p[26])
+    v4, d4, w4 = _ramp(s, p[15], p[27])
+    v5, d5, w5 = _ramp(s, p[16], p[28])
+    v6, d6, w6 = _ramp(s, p[17], p[29])
+    v7, d7, w7 = _ramp(s, p[18], p[30])
+    v8, d8, w8 = _ramp(s, p[19], p[31])
+    v9, d9, w9 = _ramp(s, p[20], p[32])
+    va, da, wa = _ramp(s, p[21], p[33])
+    vb, db, wb = _ramp(s, p[22], p[34])
     return (
         v0 + v1 + v2 + v3 + v4 + v5 + v6 + v7 + v8 + v9 + va + vb,
         d0 + d1 + d2 + d3 + d4 + d5 + d6 + d7 + d8 + d9 + da + db,
@@ -214,7 +225,7 @@ def _phi(s, p):
 def update(motion, stress, state, dt, p):
     """Stress, largest energy and mean closing rate after the step."""
     unloading, cutoff, rate_coefficient, per_reference, per_average, initial = p[0], p[1], p[2], p[3], p[4], p[5]
-    solid_ratio, solid, keeping = p[6], p[7], p[8]
+    solid_ratio, solid, cut_strain, cut_energy, keeping = p[6], p[7], p[8], p[9], p[10]
     largest, rate = state[0], state[1]
 
     f = motion.deformation
@@ -224,9 +235,15 @@ def update(motion, stress, state, dt, p):
     s = math.sqrt(contract(biot, biot))
     phi, slope, energy = _phi(s, p)
 
-    # extension: 0 in shear and compression, 1 from uniaxial extension on
-    extension = min(max(trace(biot) / max(s, 1e-12), 0.0), 1.0)
-    phi = phi + extension * (min(phi, cutoff) - phi)
+    # extension: x is 0 in shear and compression, 1 from uniaxial extension on
+    per_strain = 1.0 / max(s, 1e-9)
+    x = min(max(trace(biot) * per_strain, 0.0), 1.0)
+    weight = x * x * (3.0 - 2.0 * x)
+    excess = max(phi - cutoff, 0.0)
+    gap = select(excess > 0.0, cut_energy + cutoff * (s - cut_strain) - energy, 0.0)
+    turning = 6.0 * x * (1.0 - x) * gap * per_strain
+    phi = phi - weight * excess
+    energy = energy + weight * gap
 
     # hysteresis
     largest = max(largest, energy)
@@ -242,12 +259,17 @@ def update(motion, stress, state, dt, p):
     # phi/s -> initial slope as s -> 0
     secant = select(s > 1e-9, phi / max(s, 1e-9), initial)
     inverse = 1.0 / motion.volume_ratio
-    crushed = congruence(turned, commuting_product(scale_sym(eta * stiffening * secant * inverse, biot), stretch))
+    # T = phi B/s + w' (W_c - W) (I - x B/s)/s
+    share = eta * stiffening * inverse
+    nominal = add_trace(scale_sym(share * (secant - turning * x * per_strain), biot), share * turning)
+    crushed = congruence(turned, commuting_product(nominal, stretch))
     squeezed = solid_ratio * inverse
     new = add_trace(crushed, -solid * max(squeezed - 1.0, 0.0))
 
     # bound of the tangent in space: reference moduli carried by two stretches; the averaged rate is a spring too
     longest = largest_eigenvalue_bound(left_cauchy_green(f))
     hurried = rate_coefficient * phi * per_reference * per_average / (1.0 + rate * per_reference)
-    modulus = (max(slope, secant) * stiffening + 2.0 * hurried) * longest * max(inverse, 1.0)
+    # while the direction turns towards extension, w and its derivatives add to it
+    bent = select((x > 0.0) & (x < 1.0), (6.0 * excess - 18.0 * gap * per_strain) * per_strain, 0.0)
+    modulus = ((max(slope, secant) + bent) * stiffening + 2.0 * hurried) * longest * max(inverse, 1.0)
     return new, (largest, rate), Moduli(select(squeezed > 1.0, solid * squeezed, 0.0), 0.5 * modulus, keeping)
