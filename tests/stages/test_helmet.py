@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from replay.cli import main
-from replay.decks import DeckInput, PartSet, deck_parts, read_keyword
+from replay.decks import Cable, DeckInput, PartSet, deck_parts, read_keyword
 from replay.decks.keyword.columns import card, joined, set_lines
 from replay.decks.keyword.renumber import dangling
 from replay.decks.keyword.units import SYSTEMS
@@ -21,6 +21,7 @@ from replay.models import Model, assembly_mass, build_model, read_model, select_
 from replay.models.inspection import helmet_datum
 from replay.stages.foreign_deck import read_deck_as_model
 from replay.stages.own_deck import model_facts, node_sets, region_sets
+from replay.stages.problem import chin_straps
 
 TONNE = SYSTEMS["mm-tonne-s"]
 
@@ -336,6 +337,18 @@ def test_our_assembly_comes_back_from_keyword_to_the_last_bit(tmp_path: Path, mo
     write_lsdyna(tmp_path, own_deck(model))
     back = read_deck_as_model([tmp_path / "main.k"])
     assert model_hash(tmp_path, back) == model_hash(tmp_path, model)
+
+
+def test_a_helmet_seated_by_contact_comes_back_too_with_contacts_and_straps_beside_it(tmp_path: Path) -> None:
+    seated = build_model("nfl", "tiny", seat="contact")
+    cables = tuple(
+        Cable(s.name, int(s.nodes[0]), int(s.nodes[-1]), s.stiffness_n_per_m) for s in chin_straps(seated)[1]
+    )
+    write_lsdyna(tmp_path, replace(own_deck(seated), contact=True, cables=cables))
+    text = (tmp_path / "main.k").read_text(encoding="utf-8")
+    assert (text.count("*CONTACT_AUTOMATIC"), text.count("*ELEMENT_DISCRETE")) == (4, 4)
+    back = read_deck_as_model([tmp_path / "main.k"])
+    assert model_hash(tmp_path, back) == model_hash(tmp_path, seated)
 
 
 def test_an_edited_card_holds_against_the_facts(tmp_path: Path, model: Model) -> None:

@@ -55,7 +55,10 @@ def model_of_own_deck(deck: KeywordDeck) -> Model | None:
     if facts is None:
         return None
     parts = tuple(Part(**part) for part in facts["parts"])
-    if {part.pid: part.name for part in parts} != {pid: entry.title for pid, entry in entries.items()}:
+    sections = deck.of_kind("section")
+    straps = {number for number, section in sections.items() if section.keyword.startswith("SECTION_DISCRETE")}
+    meshed = {pid: entry.title for pid, entry in entries.items() if entry.whole("secid") not in straps}
+    if {part.pid: part.name for part in parts} != meshed:
         return None
     materials = dict(facts["materials"])
     for k, part in enumerate(parts):
