@@ -28,6 +28,10 @@ RUN_FILES = {
     "states.xdmf": "the same for VisIt",
 }
 CONTACT_FILES = {"contact.csv": "contact by pair of parts: force, impulse, work"}
+STRAP_FILES = {
+    "straps.csv": "force and elongation of the chin straps",
+    "rigid_sets.csv": "motion of the chin cup's hard shell",
+}
 BRAIN_FILES = {
     "brain_histories.csv": "strain and stress of the brain by region over time",
     "element_peaks.csv": "peaks of every brain element",
@@ -84,7 +88,11 @@ def run_solver(
     stage: Stage, problem: Problem, recorders: list[Recorder], files: dict[str, str], *, threads: int | None
 ) -> str | None:
     """Run a problem in the stage's folder and list its files; a run that stops itself ends the play."""
-    folder = stage.write_all(files | (CONTACT_FILES if problem.contact is not None else {}))
+    if problem.contact is not None:
+        files = files | CONTACT_FILES
+    if problem.straps:
+        files = files | STRAP_FILES
+    folder = stage.write_all(files)
     try:
         try:
             solve(problem, folder, recorders=recorders, threads=threads)
