@@ -22,7 +22,7 @@ from replay.files import atomic_path
 SCHEMA = "replay-model"
 SCHEMA_VERSION = 1
 
-ROLES = ("brain", "csf", "skull", "scalp", "comfort_pad", "energy_pad", "shell", "facemask", "chin_cup")
+ROLES = ("brain", "csf", "skull", "scalp", "face", "comfort_pad", "energy_pad", "shell", "facemask", "chin_cup")
 
 _DATASETS = {
     "nodes/coordinates_m": ("nodes", "f8", 3),
