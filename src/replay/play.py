@@ -317,7 +317,7 @@ class ModelChoice(Setting):
     """The finite-element model."""
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
-    resolution: Literal["tiny", "coarse"] = Field(default="coarse", description="Mesh resolution.")
+    resolution: Literal["tiny", "coarse", "medium", "fine"] = Field(default="coarse", description="Mesh resolution.")
     helmet_structure: Literal["rigid", "deformable"] = Field(
         default="rigid",
         description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "

@@ -5,7 +5,7 @@ face share the rest of the head: their densities minimise
 
     sum_i ((f_i - 1) / spread)^2 + sum_axis ((cg - target) / 1 mm)^2        so that the head has its mass,
 
-f_i the factor on the nominal density. With the mass fixed the centre of gravity is linear in f: one small linear system.
+f_i the factor on the nominal density. With the mass fixed the centre of gravity is linear in f: a small linear system.
 The helmet's parts take one common factor, which leaves its centre of gravity where the nominal densities put it and
 stands for the hardware, straps and paint that are not meshed.
 """
@@ -71,10 +71,11 @@ def calibrate_densities(
     of_helmet = np.array([p.assembly == "helmet" for p in parts])
     factor: dict[str, float] = {}
     if of_helmet.any():
-        factor |= dict.fromkeys({p.material for p in parts if p.assembly == "helmet"}, helmet_mass_kg / before[of_helmet].sum())
+        share = helmet_mass_kg / before[of_helmet].sum()
+        factor |= {p.material: share for p in parts if p.assembly == "helmet"}
     for role, mass in head.part_mass_kg.items():
         rows = [k for k, p in enumerate(parts) if p.role == role]
-        factor |= dict.fromkeys({parts[k].material for k in rows}, mass / before[rows].sum())
+        factor |= {parts[k].material: mass / before[rows].sum() for k in rows}
     rest = tuple(role for role in BALANCED_ROLES if role not in head.part_mass_kg)
     factor |= _balanced(nodes, hexes, element_part, parts, head, rest, factor)
     materials: dict[str, dict[str, Any]] = {}
@@ -107,7 +108,7 @@ def _balanced(
     roles: tuple[str, ...],
     known: dict[str, float],
 ) -> dict[str, float]:
-    """Factors of the materials of `roles` that give the head its mass and bring its centre of gravity near the target."""
+    """Factors of the materials of `roles` that give the head its mass, its centre of gravity near the target."""
     library = load_materials()
     target = np.array(head.surfaces.tragion_m) + np.array(head.cg_from_tragion_m)
     fixed_mass, fixed_moment = 0.0, np.zeros(2)
@@ -120,7 +121,8 @@ def _balanced(
         body = mass_properties(nodes, hexes[here], np.full(int(here.sum()), density))
         moment = body.mass_kg * (body.cg_m - target)[[0, 2]]
         if part.role in roles:
-            free[part.material] = free.get(part.material, np.zeros(3)) + [body.mass_kg, *moment]
+            free.setdefault(part.material, np.zeros(3))
+            free[part.material] += np.array([body.mass_kg, *moment])
         else:
             fixed_mass += body.mass_kg
             fixed_moment += moment

@@ -32,9 +32,7 @@ STAR_CENTRE_MNI_MM = (0.0, -20.0, 10.0)
 BRAIN_SCALE = 0.90
 #: Ear points and orbitale in MNI space, (y, z) [mm]: the Frankfurt plane falls forwards.
 TRAGION_MNI_MM, ORBITALE_MNI_MM = (-27.1, -39.8), (73.0, -62.0)
-PITCH_RAD = float(
-    np.arctan2(TRAGION_MNI_MM[1] - ORBITALE_MNI_MM[1], ORBITALE_MNI_MM[0] - TRAGION_MNI_MM[0])
-)
+PITCH_RAD = float(np.arctan2(TRAGION_MNI_MM[1] - ORBITALE_MNI_MM[1], ORBITALE_MNI_MM[0] - TRAGION_MNI_MM[0]))
 #: Mean distance from the brain to the scalp over the calvaria [mm].
 COVER_MM = 15.5
 #: Plane that cuts the neck, from below the occiput to below the chin: a point and its outward normal, head axes [mm].
@@ -63,7 +61,7 @@ class Registration:
 
 
 def mni_directions(directions: np.ndarray) -> np.ndarray:
-    """Head axes (x anterior, y left, z superior, Frankfurt plane level) to MNI axes (x right, y anterior, z superior)."""
+    """Head axes (x anterior, y left, z superior) to MNI axes (x right, y anterior, z superior), pitched."""
     x, y, z = directions.T
     c, s = np.cos(PITCH_RAD), np.sin(PITCH_RAD)
     return np.stack([-y, c * x + s * z, c * z - s * x], axis=1)
@@ -93,7 +91,7 @@ def skin_radii_mm(points: np.ndarray, triangles: np.ndarray, directions: np.ndar
             u = np.einsum("ij,kij->ki", -first, normal) / size
             v = np.einsum("kj,ij->ki", d, lift) / size
             t = height[None, :] / size
-        hit = (np.abs(size) > 1e-9) & (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
+            hit = (np.abs(size) > 1e-9) & (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
         out[start : start + 256] = np.where(hit, t, 0.0).max(axis=1)
     return out
 
@@ -220,6 +218,7 @@ def write(values: dict[str, np.ndarray], path: Path) -> None:
             array = io.BytesIO()
             np.save(array, np.asarray(values[name]))
             archive.writestr(zipfile.ZipInfo(f"{name}.npy", (2000, 1, 1, 0, 0, 0)), array.getvalue())
+
 
 def main(argv: list[str]) -> int:
     """Derive the file from two wheels; print what the fits miss."""

@@ -69,7 +69,7 @@ class HarmonicSurface:
         return round((np.sqrt(8 * len(self.coefficients_m) + 1) - 3) / 2)
 
     def smoothed(self, sigma_deg: float) -> HarmonicSurface:
-        """The surface after diffusion over the sphere, which is a Gaussian mean of this width: ``exp(-l (l+1) s^2/2)``."""
+        """The surface after diffusion over the sphere, ``exp(-l (l+1) s^2 / 2)``: a Gaussian mean of this width."""
         order = np.concatenate([np.full(k + 1, k) for k in range(self.degree + 1)])
         damping = np.exp(-0.5 * order * (order + 1) * np.radians(sigma_deg) ** 2)
         return HarmonicSurface(self.coefficients_m * damping, self.scale)
