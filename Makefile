@@ -6,6 +6,7 @@
 #   make quick             the suite without its slow tests
 #   make check             formatting, lint, types, spelling, workflow lint
 #   make bench             speed: element cycles, roofline, peers where installed, start-up; an idle machine, please
+#   make accuracy          both modes of reconstruction on motions of known truth; the table of docs/accuracy.md (long)
 #   make report            the workflow's own report (needs a finished run)
 #   make lock              resolve environment.lock again from pyproject.toml (needs uv)
 #   make clean             remove results; `make distclean` also removes the environment
@@ -25,7 +26,7 @@ READY := $(VENV)/.ready
 # Two files of tests at a time; a file stays with one worker, which shares its fixtures.
 SIDE_BY_SIDE := -n 2 --dist loadfile
 
-.PHONY: run test quick check bench report lock clean distclean install
+.PHONY: run test quick check bench accuracy report lock clean distclean install
 .DEFAULT_GOAL := run
 
 run: $(READY)
@@ -50,6 +51,9 @@ bench: $(READY)
 	$(IN) python benchmarks/roofline.py 64
 	$(IN) python benchmarks/peers.py 32
 	$(IN) python benchmarks/start_up.py
+
+accuracy: $(READY)
+	$(IN) cd benchmarks && python accuracy_suite.py run && python accuracy_suite.py table
 
 report: $(READY)
 	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip --report results/$(PLAY)/workflow-report.zip $(CONFIG)

@@ -25,6 +25,14 @@ MATERIALS = {
     "viscohyperelastic": {
         "bulk_modulus_pa": 2e6, "shear_modulus_pa": 5e3, "prony_ratios": [0.4, 0.3], "prony_times_s": [1e-3, 1e-2],
     },
+    "brain_isv": {
+        "shear_modulus_pa": 14e3, "bulk_modulus_pa": 2e6, "reference_rate_per_s": 100.0, "rate_exponent": 1.0,
+        "yield_stress_pa": 6.5e3, "pressure_sensitivity": 0.0, "locking_stretch": 2.3, "network_modulus_pa": 470.0,
+        "back_stress_modulus_pa": 45.0, "softening_rate": 14.0, "initial_xi1": 0.0, "initial_xi_star": 0.036,
+        "xi_star_saturation": 0.006, "xi_star_rate": 7.2, "softening_factor": 0.018, "hardening_rate": 16.0,
+        "initial_xi2": 0.0, "xi2_saturation": 2.0, "hardening_factor": 0.16, "pore_growth_exponent": 1.5,
+        "pore_shear_sensitivity": 1e-6, "initial_porosity": 1e-6,
+    },
     "fluid": {"bulk_modulus_pa": 2e6, "shear_modulus_pa": 1e3},
     "crushable_foam": {"youngs_modulus_pa": 1e6, "plateau_stress_pa": 5e4, "densification_strain": 0.6},
 }  # fmt: skip

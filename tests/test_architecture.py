@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-ROOMS = {"motion", "models", "measures", "gates", "decks", "bundle", "report"}
+ROOMS = {"motion", "models", "measures", "gates", "decks", "bundle", "report", "laboratory"}
 LEAVES = {"controls", "documents", "errors", "files", "tables", "manifest", "play"}
 MAY_IMPORT: dict[str, set[str]] = {
     "cli": {"stages", "doctor", *LEAVES},

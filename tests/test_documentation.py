@@ -33,7 +33,7 @@ reads back to the same bits. This page is generated from the formats in the code
 | `reconstruction/` | the protocol's five files, `kinematics.csv`, `gate.json` |
 | `driver/` | `driver_6dof.csv`, `initial_velocity.json` |
 | `assembly/` | `model.h5`, `parts.csv`, mass properties, inspection, preview, the helmet and assembly gates |
-| `decks/velodyne`, `decks/lsdyna` | the run decks of the same replay for other solvers |
+| `decks/velodyne`, `decks/lsdyna`, `decks/openradioss` | the run decks of the same replay for other solvers |
 | `shake/` | the helmet's millisecond of free flight and its gate |
 | `replay/` | the run: ledger, time steps, histories, states, brain, and the numerics gate |
 | `sensitivity/` | the same run at half the hourglass coefficient, and its gate |

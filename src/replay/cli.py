@@ -34,6 +34,7 @@ _STAGES: dict[str, tuple[str, str]] = {
 }
 _ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
 _PULSES = ("sine_squared", "half_sine", "triangle", "skewed", "double")
+_UNITS = ("m-kg-s", "mm-tonne-s", "mm-kg-ms", "mm-g-ms", "cm-g-us", "cm-g-s", "in-lbf-s")
 _SOLVING = ("shake", "impact", "sensitivity")
 
 
@@ -140,6 +141,45 @@ def _parser() -> argparse.ArgumentParser:
     solve.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
     solve.add_argument("--anew", action="store_true", help="start from time 0 even where a checkpoint lies")
 
+    helmet = commands.add_parser("helmet", help="a helmet from LS-DYNA keyword files: look at it, make it ready")
+    actions = helmet.add_subparsers(dest="action", required=True, metavar="inspect | prepare")
+    for action, text in (
+        ("inspect", "census, quality, mass, datum and interfaces of a deck; the helmet gate"),
+        ("prepare", "remove wedges, renumber, convert to SI; write model, include file and manifest"),
+    ):
+        command = actions.add_parser(action, help=text, description=text)
+        command.add_argument("files", type=Path, nargs="+", metavar="FILE.k", help="read as one deck")
+        command.add_argument(
+            "--units", choices=_UNITS, help="length-mass-time of the deck (default: found, or refused)"
+        )
+        command.add_argument("--settings", type=Path, metavar="HELMET.yaml", help="datum, mounts, roles, materials")
+        if action == "inspect":
+            command.add_argument("--json", type=Path, metavar="FILE.json", help="also write the report")
+        else:
+            command.add_argument("--as", dest="helmet", type=int, choices=[1, 2], required=True, help="helmet 1 or 2")
+            command.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+    material = commands.add_parser("material", help="put one material through one test; table and picture")
+    material.add_argument("name", help="a material of the model, or brain:<set>")
+    material.add_argument(
+        "--mode", default="compression", help="compression, tension, simple_shear, confined, cyclic, relaxation"
+    )
+    material.add_argument("--rate", type=float, default=30.0, metavar="PER_S", help="nominal strain rate")
+    material.add_argument("--strain", type=float, default=0.3, help="largest nominal strain, positive")
+    material.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
+    calibrate = commands.add_parser("calibrate", help="fit the brain's law to tests; report with identifiability")
+    calibrate.add_argument("data", type=Path, metavar="DATA.csv", help="docs/file-formats.md says what it holds")
+    calibrate.add_argument("--modes", default="compression", choices=["compression", "simple_shear", "all"])
+    calibrate.add_argument("--hold", nargs="*", default=[], metavar="PARAMETER", help="parameters that are not fitted")
+    calibrate.add_argument("--starts", type=_positive, default=8, help="first guesses")
+    calibrate.add_argument("--seed", type=int, default=1, help="of the random first guesses")
+    calibrate.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
+    figures = commands.add_parser("tissue-figures", help="the article's Figures 1 to 4 from the shipped parameters")
+    figures.add_argument("--data", type=Path, metavar="DATA.csv", help="tests to show (default: the shipped ones)")
+    figures.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
+    figures.add_argument("--out", type=Path, required=True, metavar="FOLDER")
+
     commands.add_parser("doctor", help="check this machine and environment")
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
     schema.add_argument("--out", type=Path, help="write it to a file instead")
@@ -241,8 +281,17 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _run_helmet(arguments: argparse.Namespace) -> int:
+    from replay.stages import helmet
+
+    given = {"units": arguments.units, "settings_file": arguments.settings}
+    if arguments.action == "inspect":
+        return helmet.inspect(arguments.files, out=arguments.json, **given)
+    return helmet.prepare(arguments.files, helmet=arguments.helmet, out=arguments.out, **given)
+
+
 def _run_tool(arguments: argparse.Namespace) -> int:
-    from replay.stages import explicit, tools
+    from replay.stages import explicit, laboratory, tools
 
     call: dict[str, Callable[[], int]] = {
         "verdict": lambda: tools.show_verdict(arguments.results),
@@ -268,6 +317,21 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             arguments.out or Path(f"{arguments.model.stem}-run"),
             threads=arguments.threads,
             anew=arguments.anew,
+        ),
+        "helmet": lambda: _run_helmet(arguments),
+        "material": lambda: laboratory.run_material(
+            arguments.name, arguments.mode, arguments.rate, arguments.strain, arguments.out
+        ),
+        "calibrate": lambda: laboratory.run_calibration(
+            arguments.data,
+            arguments.out,
+            modes=arguments.modes,
+            hold=arguments.hold,
+            starts=arguments.starts,
+            seed=arguments.seed,
+        ),
+        "tissue-figures": lambda: laboratory.run_article_figures(
+            arguments.out, arguments.data, threads=arguments.threads
         ),
         "schema": lambda: tools.write_schema(arguments.out),
     }

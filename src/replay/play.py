@@ -287,6 +287,19 @@ class Window(Setting):
     )
 
 
+class ReconstructionChoice(Setting):
+    """Which of the two reconstructions drives the replay; both are always made and shown."""
+
+    mode: Literal["protocol", "posterior"] = Field(
+        default="protocol",
+        description="`protocol`: the article's method, comparable between laboratories; `posterior`: a motion from the "
+        "middle of the batch estimate's posterior, which peaks between the frames.",
+    )
+    ensemble: Annotated[int, Field(ge=0, le=200)] = Field(
+        default=0, description="Number of drivers drawn from the posterior, for an ensemble of replays; 0 for none."
+    )
+
+
 class Helmet(Setting):
     """The physical helmet that was worn."""
 
@@ -318,6 +331,10 @@ class ModelChoice(Setting):
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
     resolution: Literal["tiny", "coarse", "medium", "fine"] = Field(default="coarse", description="Mesh resolution.")
+    brain_material: Literal["brain_isv", "viscohyperelastic"] = Field(
+        default="brain_isv",
+        description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
+    )
     helmet_structure: Literal["rigid", "deformable"] = Field(
         default="rigid",
         description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "
@@ -379,6 +396,9 @@ class Play(Setting):
         default="angular", description="Impact reference: peak angular or linear acceleration (protocol 2.4)."
     )
     window: Window = Field(default_factory=lambda: Window(), description="The time that is replayed.")
+    reconstruction: ReconstructionChoice = Field(
+        default_factory=lambda: ReconstructionChoice(), description="Which reconstruction drives the replay."
+    )
     helmet: Helmet = Field(default_factory=lambda: Helmet(), description="The physical helmet.")
     model: ModelChoice = Field(default_factory=lambda: ModelChoice(), description="The finite-element model.")
     solver: SolverSettings = Field(default_factory=lambda: SolverSettings(), description="Controls of the solver.")
@@ -394,6 +414,17 @@ class Play(Setting):
         "hash and reason instead.",
     )
     _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="after")
+    def _a_wearable_has_no_posterior(self) -> Play:
+        asked = self.reconstruction.mode == "posterior" or self.reconstruction.ensemble > 0
+        if self.source.kind == "wearable" and asked:
+            refuse(
+                "reconstruction asks for the posterior of a wearable's record",
+                "clicks: a wearable is read as it is",
+                "remove the block `reconstruction`",
+            )
+        return self
 
     @property
     def folder(self) -> Path:

@@ -14,9 +14,8 @@ from replay.decks import (
     DeckControls,
     DeckInput,
     DeckPart,
-    Driver,
     FrictionPair,
-    InitialVelocity,
+    KeywordDeck,
     PartSet,
     axis_through,
     deck_parts,
@@ -27,96 +26,54 @@ from replay.decks import (
 )
 from replay.decks.lsdyna import foam_curve, one_decay
 from replay.errors import InputError
-
-ELASTIC = {"youngs_modulus_pa": 3.356e9, "poisson_ratio": 0.43}
-FOAM = {"youngs_modulus_pa": 10.5e6, "plateau_stress_pa": 0.35e6, "densification_strain": 0.65}
-BRAIN = {
-    "bulk_modulus_pa": 2.19e9,
-    "shear_modulus_pa": 6e3,
-    "prony_ratios": [0.5, 0.3],
-    "prony_times_s": [0.01, 0.1],
-}
-PARTS = (
-    DeckPart(60000001, "brain", "viscohyperelastic", 1012.345678, BRAIN, "head"),
-    DeckPart(60000002, "csf", "fluid", 1040.0, {"bulk_modulus_pa": 2.19e9, "shear_modulus_pa": 1e3}, "head"),
-    DeckPart(60000003, "skull", "rigid", 1357.0, {"youngs_modulus_pa": 12.04e9, "poisson_ratio": 0.22}, "head"),
-    DeckPart(60009020, "scalp", "elastic", 1200.0, {"youngs_modulus_pa": 16.7e6, "poisson_ratio": 0.42}, "head"),
-    DeckPart(10000174, "comfort_pad_crown", "crushable_foam", 84.3, FOAM, "helmet"),
-    DeckPart(10000180, "comfort_pad_jaw", "crushable_foam", 84.3, FOAM, "helmet"),
-    DeckPart(10000184, "energy_pad_crown", "crushable_foam", 84.3, FOAM, "helmet"),
-    DeckPart(10000181, "chin_cup", "crushable_foam", 84.3, FOAM, "helmet"),
-    DeckPart(10000001, "shell", "elastic", 1500.0, ELASTIC, "helmet"),
-)
+from tests.decks.conftest import ELASTIC, FOAM, PARTS
 
 
-@pytest.fixture
-def deck() -> DeckInput:
-    """A column of hexes, one a part, tied to each other by shared nodes, at awkward coordinates."""
-    rng = np.random.default_rng(5)
-    count = len(PARTS)
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]) * 0.0213
-    nodes = np.vstack([square + np.array([0, 0, 0.0171 * k]) for k in range(count + 1)])
-    nodes = nodes + rng.normal(scale=1e-3, size=nodes.shape) - 0.11
-    hexes = np.arange(8)[None] + 4 * np.arange(count)[:, None]
-    omega = np.array([2.0, 45.01, -0.7])
-    speed, p, q = axis_through([0.01, -0.02, 0.03], omega)
-    time = np.linspace(0, 0.03, 61)
-    return DeckInput(
-        title="a test deck",
-        nodes=nodes,
-        node_ids=60_000_001 + np.arange(len(nodes)),
-        hexes=hexes,
-        element_ids=10_000_001 + np.arange(count),
-        element_part=np.arange(count),
-        parts=PARTS,
-        part_sets=(
-            PartSet(10000099, "H1_pads_set1", (10000174, 10000180)),
-            PartSet(10000100, "H1_pads_set2", (10000184,)),
-            PartSet(99, "all_parts", tuple(part.pid for part in PARTS)),
-        ),
-        initial_velocities=(InitialVelocity(99, (0.2, 8.3232, 0.0), speed, p, q),),
-        driver=Driver(60000003, time, np.cos(np.outer(time, [90, 50, 70])), 40 * np.sin(np.outer(time, [80, 30, 60]))),
-        notes=("pads share nodes with the scalp",),
-    )
+def numbers_of(deck: KeywordDeck, keyword: str, row: int = 0) -> tuple[float, ...]:
+    """What stands on one card of the only entry of a keyword."""
+    (entry,) = deck.named(keyword)
+    return tuple(v for v in entry.rows[row].values if isinstance(v, int | float))
 
 
 def test_keyword_deck_reads_back_to_field_precision(tmp_path: Path, deck: DeckInput) -> None:
     write_lsdyna(tmp_path, deck)
     back = read_keyword(tmp_path / "main.k")
-    assert sorted(back.nodes) == sorted(deck.node_ids.tolist())
-    read = np.array([back.nodes[i] for i in deck.node_ids.tolist()])
-    np.testing.assert_allclose(read, deck.nodes, rtol=1e-11, atol=1e-12)
-    for k, element in enumerate(deck.element_ids.tolist()):
-        part, nodes = back.solids[element]
-        assert part == deck.parts[deck.element_part[k]].pid
-        assert list(nodes) == deck.node_ids[deck.hexes[k]].tolist()
-    assert back.parts == {p.pid: (p.name, p.pid, p.pid) for p in deck.parts}
-    assert back.part_sets == {s.sid: (s.name, s.pids) for s in deck.part_sets}
+    assert back.node_ids.tolist() == deck.node_ids.tolist()
+    np.testing.assert_allclose(back.nodes, deck.nodes, rtol=1e-11, atol=1e-12)
+    assert back.solids.ids.tolist() == deck.element_ids.tolist()
+    assert back.solids.parts.tolist() == [deck.parts[k].pid for k in deck.element_part.tolist()]
+    np.testing.assert_array_equal(back.solids.nodes[:, :8], deck.node_ids[deck.hexes])
+    parts, sets = back.of_kind("part"), back.of_kind("part_set")
+    assert {pid: (e.title, e.whole("secid"), e.whole("mid")) for pid, e in parts.items()} == {
+        p.pid: (p.name, p.pid, p.pid) for p in deck.parts
+    }
+    assert {sid: (e.title, e.members()) for sid, e in sets.items()} == {s.sid: (s.name, s.pids) for s in deck.part_sets}
 
 
 def test_keyword_controls_are_the_articles(tmp_path: Path, deck: DeckInput) -> None:
     write_lsdyna(tmp_path, deck)
-    cards = read_keyword(tmp_path / "main.k").cards
-    assert cards["*CONTROL_TERMINATION"] == (0.03,)
-    assert cards["*CONTROL_TIMESTEP"] == (0.0, 0.9, 0, 0.0, -1.92e-7)
-    assert cards["*CONTROL_HOURGLASS"] == (4, 0.1)
-    assert cards["*CONTROL_BULK_VISCOSITY"] == (1.2, 0.06, 1)
-    assert cards["*DATABASE_BINARY_D3PLOT"] == (1e-3,)
+    back = read_keyword(tmp_path / "main.k")
+    assert numbers_of(back, "CONTROL_TERMINATION") == (0.03,)
+    assert numbers_of(back, "CONTROL_TIMESTEP") == (0.0, 0.9, 0, 0.0, -1.92e-7)
+    assert numbers_of(back, "CONTROL_HOURGLASS") == (4, 0.1)
+    assert numbers_of(back, "CONTROL_BULK_VISCOSITY") == (1.2, 0.06, 1)
+    assert numbers_of(back, "DATABASE_BINARY_D3PLOT") == (1e-3,)
 
 
 def test_materials_are_mapped_as_the_table_says(tmp_path: Path, deck: DeckInput) -> None:
     write_lsdyna(tmp_path, deck)
     back = read_keyword(tmp_path / "main.k")
-    keywords = {pid: keyword for pid, (keyword, _) in back.materials.items()}
-    assert keywords[60000001] == keywords[60000002] == "*MAT_VISCOELASTIC"
-    assert keywords[60000003] == "*MAT_RIGID"
-    assert keywords[60009020] == keywords[10000001] == "*MAT_ELASTIC"
-    assert keywords[10000174] == "*MAT_CRUSHABLE_FOAM"
-    density, bulk, short, long, rate = back.materials[60000001][1]
+    materials = back.of_kind("material")
+    keywords = {pid: entry.keyword for pid, entry in materials.items()}
+    assert keywords[60000001] == keywords[60000002] == "MAT_VISCOELASTIC"
+    assert keywords[60000003] == "MAT_RIGID"
+    assert keywords[60009020] == keywords[10000001] == "MAT_ELASTIC"
+    assert keywords[10000174] == "MAT_CRUSHABLE_FOAM"
+    density, bulk, short, long, rate = (materials[60000001].number(name) for name in ("ro", "bulk", "g0", "gi", "beta"))
     assert density == pytest.approx(1012.345678, rel=1e-6)
     assert (bulk, short, long) == (2.19e9, 6000, pytest.approx(1200))
     assert 1 / rate == pytest.approx((0.5 * 0.01 + 0.3 * 0.1) / 0.8, rel=1e-6)
-    curve = np.array(back.curves[10000174])
+    curve = back.curve(10000174)
     np.testing.assert_allclose(curve.T, foam_curve(FOAM), rtol=1e-12)
     assert curve[1, 1] / curve[1, 0] == pytest.approx(FOAM["youngs_modulus_pa"], rel=0.1)
     assert (np.diff(curve[:, 1]) >= 0).all()
@@ -144,7 +101,8 @@ def test_the_axis_through_p_and_q_gives_back_the_angular_velocity(tmp_path: Path
     ours = np.array(card.velocity_m_per_s) + card.omega_rad_per_s * np.cross(axis, points - p)
     np.testing.assert_allclose(ours, expected, atol=1e-12)
     write_lsdyna(tmp_path / "lsdyna", deck)
-    (fields,) = read_keyword(tmp_path / "lsdyna" / "main.k").initial_velocities
+    back = read_keyword(tmp_path / "lsdyna" / "main.k")
+    fields = (*numbers_of(back, "INITIAL_VELOCITY_GENERATION"), *numbers_of(back, "INITIAL_VELOCITY_GENERATION", 1))
     assert fields[:2] == (99, 1)
     other = np.array(fields[3:6]) + fields[2] * np.cross(fields[9:12], points - np.array(fields[6:9]))
     np.testing.assert_allclose(other, expected, atol=3e-4)  # ten-column fields
@@ -161,10 +119,11 @@ def test_the_driver_is_six_velocity_curves_of_the_skull(tmp_path: Path, deck: De
     write_lsdyna(tmp_path, deck)
     back = read_keyword(tmp_path / "main.k")
     assert deck.driver is not None
-    assert [card[:3] for card in back.prescribed] == [(60000003, dof, 0) for dof in (1, 2, 3, 5, 6, 7)]
+    prescribed = list(back.named("BOUNDARY_PRESCRIBED_MOTION_RIGID"))
+    assert [entry.rows[0].values[:3] for entry in prescribed] == [(60000003, dof, 0) for dof in (1, 2, 3, 5, 6, 7)]
     values = np.hstack([deck.driver.velocity_m_per_s, deck.driver.omega_rad_per_s])
-    for k, card in enumerate(back.prescribed):
-        curve = np.array(back.curves[int(card[3])])
+    for k, entry in enumerate(prescribed):
+        curve = back.curve(entry.whole("lcid"))
         np.testing.assert_allclose(curve[:, 0], deck.driver.time_s, rtol=1e-12)
         np.testing.assert_allclose(curve[:, 1], values[:, k], rtol=1e-12, atol=1e-14)
 
@@ -207,7 +166,7 @@ def test_other_controls_reach_both_decks(tmp_path: Path, deck: DeckInput) -> Non
     write_velodyne(tmp_path / "v", other)
     write_lsdyna(tmp_path / "l", other)
     assert read_velodyne(tmp_path / "v" / "velodyne.card").settings["Termination time"] == (1e-3,)
-    assert read_keyword(tmp_path / "l" / "main.k").cards["*CONTROL_HOURGLASS"] == (4, 0.05)
+    assert numbers_of(read_keyword(tmp_path / "l" / "main.k"), "CONTROL_HOURGLASS") == (4, 0.05)
 
 
 def test_every_field_keeps_to_its_columns(tmp_path: Path, deck: DeckInput) -> None:
@@ -274,7 +233,7 @@ def test_a_damaged_deck_names_its_line(tmp_path: Path, deck: DeckInput) -> None:
         read_velodyne(card)
     write_lsdyna(tmp_path, deck)
     (tmp_path / "main.k").write_text("*KEYWORD\n*CONTROL_TERMINATION\n    thirty\n*END\n")
-    with pytest.raises(InputError, match=r"main.k:2: \*CONTROL_TERMINATION cannot be read"):
+    with pytest.raises(InputError, match=r"main.k:3: endtim: 'thirty' is no number"):
         read_keyword(tmp_path / "main.k")
 
 
@@ -298,10 +257,11 @@ def test_friction_pairs_can_be_replaced(tmp_path: Path, deck: DeckInput) -> None
 
 def test_rigid_parts_that_share_nodes_are_merged_and_others_are_not(tmp_path: Path, deck: DeckInput) -> None:
     write_lsdyna(tmp_path / "one", deck)
-    assert read_keyword(tmp_path / "one" / "main.k").merged_bodies == []  # the skull alone
+    assert not list(read_keyword(tmp_path / "one" / "main.k").named("CONSTRAINED_RIGID_BODIES"))  # the skull alone
     rigid = {"law": "rigid", "parameters": ELASTIC}
     # Cups 6, 7 and shell 8 lie on each other and are one body; the skull (2) touches none of them.
     parts = (*PARTS[:6], *(dataclasses.replace(part, **rigid) for part in PARTS[6:]))
     write_lsdyna(tmp_path / "two", dataclasses.replace(deck, parts=parts))
     back = read_keyword(tmp_path / "two" / "main.k")
-    assert back.merged_bodies == [(PARTS[6].pid, PARTS[7].pid), (PARTS[6].pid, PARTS[8].pid)]
+    merged = [entry.rows[0].values[:2] for entry in back.named("CONSTRAINED_RIGID_BODIES")]
+    assert merged == [(PARTS[6].pid, PARTS[7].pid), (PARTS[6].pid, PARTS[8].pid)]

@@ -35,16 +35,6 @@ def settings(**changes):
     return CameraSettings.model_validate({**values, **changes})
 
 
-@pytest.fixture(scope="module")
-def demo(repository):
-    return reconstruct(load_play(repository / "config" / "plays" / "demo"))
-
-
-@pytest.fixture(scope="module")
-def broadcast(repository):
-    return reconstruct(load_play(repository / "config" / "plays" / "broadcast"))
-
-
 def test_without_noise_the_poses_are_those_of_the_truth():
     truth = Impact().at(CAMERA.times)
     exact = CAMERA.see(truth, POINTS, np.array(HEAD_SIZED_OFFSET_M))
@@ -127,9 +117,12 @@ def test_broadcast_says_what_it_cannot_show(broadcast):
 def test_files_have_their_fixed_columns_and_the_summary_is_one_page(demo, tmp_path):
     names = [path.name for path in demo.write(tmp_path)]
     assert sorted(names) == [
+        "click_weights.csv",
         "initial_conditions_t0.csv",
         "kinematics.csv",
+        "peaks.csv",
         "poses_per_frame.csv",
+        "posterior_motion.csv",
         "qc_per_frame.csv",
         "qc_summary.txt",
     ]
@@ -146,7 +139,7 @@ def test_files_have_their_fixed_columns_and_the_summary_is_one_page(demo, tmp_pa
 def test_initial_conditions_carry_the_axis_of_rotation(demo, tmp_path):
     demo.write(tmp_path)
     table = INITIAL_CONDITIONS.read(tmp_path / "initial_conditions_t0.csv")
-    assert table["instant"].tolist() == ["t0", "window_start"]
+    assert table["instant"].tolist() == ["t0", "window_start"] * 2
     p = table[["px_m", "py_m", "pz_m"]].to_numpy()
     q = table[["qx_axis_m", "qy_axis_m", "qz_axis_m"]].to_numpy()
     omega = table[[f"omega_{c}_rad_per_s" for c in "xyz"]].to_numpy()

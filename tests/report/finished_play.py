@@ -142,7 +142,25 @@ def kinematics() -> pd.DataFrame:
         table[f"a_head_{axis}_m_per_s2"] = 610 * share * bump + 14 * np.sin(300 * t)
         table[f"omega_head_{axis}_rad_per_s"] = 30 * share * np.cumsum(bump) / bump.sum()
         table[f"alpha_head_{axis}_rad_per_s2"] = 3700 * share * bump
+    table["omega_rad_per_s"] = 29.0 * np.cumsum(bump) / bump.sum()
+    for end, factor in (("", 1.05), ("_lo", 0.98), ("_hi", 1.12)):
+        table[f"posterior_omega_rad_per_s{end}"] = factor * table["omega_rad_per_s"]
     return pd.DataFrame(table)
+
+
+def peaks() -> pd.DataFrame:
+    unresolved = "not resolvable from this footage"
+    return pd.DataFrame(
+        {
+            "quantity": ["omega_rad_per_s", "a_along_m_per_s2", "t0_s"],
+            "protocol": [29.0, 310.0, 0.1001],
+            "protocol_null": [0.7, 290.0, np.nan],
+            "posterior": [30.5, np.nan, 0.0984],
+            "posterior_lo": [28.4, np.nan, 0.0971],
+            "posterior_hi": [32.5, np.nan, 0.0995],
+            "resolved": ["yes", unresolved, "yes"],
+        }
+    )
 
 
 def energy() -> pd.DataFrame:
@@ -325,6 +343,7 @@ def finished_play() -> ReportInput:
         t0_s=0.0551,
         window_s=(0.0451, 0.0751),
         kinematics=kinematics(),
+        peaks=peaks(),
         driver=motion(),
         applied=motion(301, noise=0.004),
         fidelity=fidelity(),
@@ -411,7 +430,7 @@ def rejected_play() -> ReportInput:
         ],
         "loosened": [],
     }
-    kept = {"play", "gate_facts", "t0_s", "window_s", "kinematics", "quality", "inputs", "provenance"}
+    kept = {"play", "gate_facts", "t0_s", "window_s", "kinematics", "peaks", "quality", "inputs", "provenance"}
     fields = {f.name: getattr(whole, f.name) for f in dataclasses.fields(ReportInput) if f.name in kept}
     stages = [{**s, "state": "done" if k == 0 else "fail" if k == 1 else "not run"} for k, s in enumerate(whole.stages)]
     return ReportInput(**fields, verdict=status, gates=[stopped[0], bad], stages=stages)

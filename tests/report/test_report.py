@@ -127,6 +127,13 @@ def test_the_articles_four_tables_are_filled(page):
     assert "5.806" in page.text
 
 
+def test_both_modes_stand_side_by_side_and_what_is_not_resolved_says_so(written):
+    html = written.read_text(encoding="utf-8")
+    for words in ("Peaks in both modes", "30.5 (28.4 to 32.5)", "not resolvable from this footage"):
+        assert words in html
+    assert "Angular velocity: protocol mode up to 29 rad/s" in html
+
+
 def test_strain_never_stands_without_its_convergence_class(page):
     assert "Convergence class A" in page.text
     assert "published convergence studies need 202 800" in page.text

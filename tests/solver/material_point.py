@@ -19,6 +19,14 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "viscohyperelastic": {
         "bulk_modulus_pa": 2e6, "shear_modulus_pa": 6e3, "prony_ratios": (0.5, 0.3), "prony_times_s": (0.01, 0.1),
     },
+    "brain_isv": {
+        "shear_modulus_pa": 14.06e3, "bulk_modulus_pa": 2.19e9, "reference_rate_per_s": 100.0, "rate_exponent": 1.0,
+        "yield_stress_pa": 6.53e3, "pressure_sensitivity": 0.0, "locking_stretch": 2.3, "network_modulus_pa": 471.0,
+        "back_stress_modulus_pa": 45.0, "softening_rate": 14.3, "initial_xi1": 0.0, "initial_xi_star": 0.036,
+        "xi_star_saturation": 0.0062, "xi_star_rate": 7.2, "softening_factor": 0.0185, "hardening_rate": 15.9,
+        "initial_xi2": 0.0, "xi2_saturation": 1.99, "hardening_factor": 0.158, "pore_growth_exponent": 1.5,
+        "pore_shear_sensitivity": 1e-6, "initial_porosity": 1e-6,
+    },
     "fluid": {"bulk_modulus_pa": 2e6, "shear_modulus_pa": 1e3},
     "crushable_foam": {"youngs_modulus_pa": 1e6, "plateau_stress_pa": 1e5, "densification_strain": 0.6},
 }  # fmt: skip
@@ -32,7 +40,8 @@ class Point:
         self.parameters = self.module.Parameters(**parameters)
         self.constants = tuple(float(c) for c in self.parameters.constants())
         self.stress = (0.0,) * 6
-        self.state = (0.0,) * max(len(self.module.STATE), 1)
+        rest = getattr(self.parameters, "initial_state", lambda: (0.0,) * max(len(self.module.STATE), 1))
+        self.state = tuple(float(v) for v in rest())
         self.moduli = (0.0, 0.0, 0.0)
         self.f = np.eye(3)
         self.work = 0.0

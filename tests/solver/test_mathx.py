@@ -31,6 +31,16 @@ def test_logarithm_is_right_to_two_ulps(low: float, high: float) -> None:
     assert mathx.log(1.0) == 0.0
 
 
+@pytest.mark.parametrize("scale", [1e-12, 1e-3, 0.7, 10.0, 600.0])
+def test_functions_that_vanish_at_zero_keep_their_digits(scale: float) -> None:
+    mpmath.mp.dps = 50
+    values = scale * np.concatenate([np.linspace(-1, -1e-3, 150), np.linspace(1e-3, 1, 150)])
+    assert max(ulps(mathx.expm1(x), mpmath.expm1(mpmath.mpf(float(x)))) for x in values) < 3.0
+    assert max(ulps(mathx.sinh(x), mpmath.sinh(mpmath.mpf(float(x)))) for x in values) < 3.0
+    assert max(ulps(mathx.log1p(x), mpmath.log1p(mpmath.mpf(float(x)))) for x in values if x > -1) < 3.0
+    assert mathx.expm1(0.0) == mathx.sinh(0.0) == mathx.log1p(0.0) == 0.0
+
+
 def test_exponential_stays_finite_beyond_its_range() -> None:
     assert mathx.exp(1e6) == pytest.approx(math.exp(709.0), rel=1e-12)
     assert 0.0 < mathx.exp(-1e6) < 1e-300

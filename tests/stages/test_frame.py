@@ -84,6 +84,8 @@ def test_a_gate_that_stops_the_play_stops_every_later_stage(
         "wedge_share": 0.0,
         "removed_not_wedge": 0,
         "missing_interfaces": 0,
+        "unusable_parts": 0,
+        "colliding_ids": 0,
         "min_volume_m3": 1e-9,
         "min_scaled_jacobian": 0.5,
     }

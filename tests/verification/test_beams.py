@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from marching import March, controls, crossing_period, elastic, one_part
-from replay.stages.solve import run_numbers
 
 from replay.gates import Limits, numerics_gate, part_energies
 from replay.solver import Problem, solve
 from replay.solver.blocks import structured_block
+from replay.stages.impact import run_numbers
 
 LOAD, POISSON = 4e3, 0.25
 STATIC_TIP = 0.051475

@@ -1,6 +1,7 @@
 """Decks for other solvers: the article's Velodyne-style card and LS-DYNA keyword files."""
 
 from replay.decks.deck import (
+    Cable,
     DeckControls,
     DeckInput,
     DeckPart,
@@ -8,15 +9,17 @@ from replay.decks.deck import (
     FrictionPair,
     FrictionType,
     InitialVelocity,
+    NumberedSet,
     PartSet,
     axis_through,
     deck_parts,
 )
-from replay.decks.keyword_reader import read_keyword
-from replay.decks.lsdyna import write_lsdyna
+from replay.decks.keyword import KeywordDeck, read_keyword
+from replay.decks.lsdyna import write_lsdyna, write_openradioss
 from replay.decks.velodyne import read_velodyne, write_velodyne
 
 __all__ = [
+    "Cable",
     "DeckControls",
     "DeckInput",
     "DeckPart",
@@ -24,11 +27,14 @@ __all__ = [
     "FrictionPair",
     "FrictionType",
     "InitialVelocity",
+    "KeywordDeck",
+    "NumberedSet",
     "PartSet",
     "axis_through",
     "deck_parts",
     "read_keyword",
     "read_velodyne",
     "write_lsdyna",
+    "write_openradioss",
     "write_velodyne",
 ]

@@ -47,6 +47,46 @@ class PartSet:
 
 
 @dataclass(frozen=True)
+class NumberedSet:
+    """A set of nodes or elements.
+
+    Parameters
+    ----------
+    sid, name
+        Number and title.
+    rows
+        Of the deck's nodes or elements, (k,).
+    """
+
+    sid: int
+    name: str
+    rows: np.ndarray
+
+
+@dataclass(frozen=True)
+class Cable:
+    """A strap between two nodes that carries tension only.
+
+    Parameters
+    ----------
+    name
+        Title of its part.
+    first, second
+        Rows of the deck's nodes.
+    stiffness_n_per_m
+        Of the cable as a whole.
+    slack_m
+        Elongation from which on it pulls.
+    """
+
+    name: str
+    first: int
+    second: int
+    stiffness_n_per_m: float
+    slack_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class FrictionType:
     """A friction law: static and dynamic coefficient."""
 
@@ -167,6 +207,15 @@ class DeckInput:
         Prescribed motion, or None.
     friction_types, friction_pairs
         The article's unless given.
+    contact
+        Whether parts touch: then there is a contact of everything, and one a friction pair; otherwise parts that touch
+        share nodes.
+    node_sets, element_sets
+        Sets of nodes and of elements.
+    cables
+        Straps.
+    facts
+        What no card can say; see `replay.decks.facts`.
     """
 
     title: str
@@ -183,6 +232,11 @@ class DeckInput:
     friction_types: tuple[FrictionType, ...] = ARTICLE_FRICTION_TYPES
     friction_pairs: tuple[FrictionPair, ...] = ARTICLE_FRICTION_PAIRS
     notes: tuple[str, ...] = field(default_factory=tuple)
+    contact: bool = False
+    node_sets: tuple[NumberedSet, ...] = ()
+    element_sets: tuple[NumberedSet, ...] = ()
+    cables: tuple[Cable, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for what, numbers in (

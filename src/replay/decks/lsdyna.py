@@ -11,26 +11,29 @@ rigid              *MAT_RIGID (020)                     nothing
 viscohyperelastic  *MAT_VISCOELASTIC (006)              two decay times become one (see `one_decay`)
 fluid              *MAT_VISCOELASTIC (006), constant G  nothing at small strain
 crushable_foam     *MAT_CRUSHABLE_FOAM (063)            rate effect and hysteresis law differ
+elastic_plastic    *MAT_PIECEWISE_LINEAR_PLASTICITY     nothing (024)
 =================  ===================================  ======================================================
 """
 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from replay.decks.deck import DeckInput, DeckPart
+from replay.decks.deck import DeckControls, DeckInput, DeckPart
+from replay.decks.keyword.columns import card, curve_lines, facts_lines, field_names, node_lines, set_lines, solid_lines
 from replay.decks.slurm import write_submit
 from replay.files import write_text
 from replay.solver.kernels.materials import crushable_foam
 
 _RIGID_DOF = {0: 1, 1: 2, 2: 3, 3: 5, 4: 6, 5: 7}
 _CURVE_BASE = 900
+_CABLE_BASE = 950
+_CABLE_REACH_M = 1.0
 _MESH_FILES = {"head": "head_1.k", "helmet": "helmet_H1.k"}
 
 
@@ -49,7 +52,30 @@ def write_lsdyna(folder: str | Path, deck: DeckInput) -> list[Path]:
     list of Path
         The files: ``main.k``, a mesh file an assembly, ``submit.slurm.sh``.
     """
-    folder = Path(folder)
+    command = 'srun "${LSDYNA:-ls-dyna}" i=main.k memory=2000m'
+    return _write(Path(folder), deck, write_submit(Path(folder), "replay-lsdyna", command))
+
+
+def write_openradioss(folder: str | Path, deck: DeckInput) -> list[Path]:
+    """Write the deck for OpenRadioss, which reads the same cards: its starter makes the engine's file of ``main.k``.
+
+    Parameters
+    ----------
+    folder, deck
+        As for `write_lsdyna`.
+
+    Returns
+    -------
+    list of Path
+        The files, with a ``submit.slurm.sh`` that runs starter and engine.
+    """
+    starter = '"${RADIOSS_STARTER:-starter_linux64_gf}" -i main.k -np "$SLURM_NTASKS"'
+    engine = 'srun "${RADIOSS_ENGINE:-engine_linux64_gf_ompi}" -i main_0001.rad'
+    submit = write_submit(Path(folder), "replay-openradioss", f"{starter}\n{engine}")
+    return _write(Path(folder), deck, submit)
+
+
+def _write(folder: Path, deck: DeckInput, submit: Path) -> list[Path]:
     written = []
     assemblies = [a for a in _MESH_FILES if any(part.assembly == a for part in deck.parts)]
     for assembly in assemblies:
@@ -58,68 +84,118 @@ def write_lsdyna(folder: str | Path, deck: DeckInput) -> list[Path]:
         written.append(path)
     main = folder / "main.k"
     write_text(main, main_text(deck, [_MESH_FILES[a] for a in assemblies]))
-    written.append(main)
-    written.append(write_submit(folder, "replay-lsdyna", 'srun "${LSDYNA:-ls-dyna}" i=main.k memory=2000m'))
-    return written
+    return [*written, main, submit]
 
 
 def main_text(deck: DeckInput, includes: Sequence[str]) -> str:
-    """``main.k``: controls, outputs, sets, loads, includes."""
-    c = deck.controls
+    """``main.k``: controls, outputs, meshes, sets, contacts, loads."""
     lines = [
         "*KEYWORD",
         f"$ {deck.title}",
         "$ units: m, kg, s, N, Pa, J (SI)",
-        "$ no *CONTACT: parts that touch share nodes",
+        *([] if deck.contact else ["$ no *CONTACT: parts that touch share nodes"]),
         *(f"$ {note}" for note in deck.notes),
+        *(facts_lines(deck.facts) if deck.facts else []),
         "*TITLE",
         deck.title[:80],
-        "*CONTROL_TERMINATION",
-        _fields("endtim"),
-        _card(c.termination_time_s),
-        "*CONTROL_TIMESTEP",
-        "$ dt2ms < 0: mass is added to elements below this step; tssfac is the article's time step scale factor",
-        _fields("dtinit", "tssfac", "isdo", "tslimt", "dt2ms"),
-        _card(0.0, c.time_step_factor, 0, 0.0, -c.mass_scaling_time_step_s),
-        "*CONTROL_HOURGLASS",
-        "$ ihq 4: stiffness form, for all parts",
-        _fields("ihq", "qh"),
-        _card(c.hourglass_method, c.hourglass_coefficient),
-        "*CONTROL_BULK_VISCOSITY",
-        _fields("q1", "q2", "type"),
-        _card(c.bulk_viscosity_quadratic, c.bulk_viscosity_linear, 1),
-        "*CONTROL_ENERGY",
-        _fields("hgen", "rwen", "slnten", "rylen"),
-        _card(2, 2, 2, 2),
-        "*DATABASE_GLSTAT",
-        _card(c.history_interval_s),
-        "*DATABASE_MATSUM",
-        _card(c.history_interval_s),
-        "*DATABASE_RBDOUT",
-        _card(c.history_interval_s),
-        "*DATABASE_BINARY_D3PLOT",
-        _card(c.plot_interval_s),
+        *_control_lines(deck.controls),
     ]
+    for include in includes:
+        lines += ["*INCLUDE", include]
     for part_set in deck.part_sets:
-        lines += ["*SET_PART_LIST_TITLE", part_set.name[:80], _card(part_set.sid)]
-        lines += [_card(*part_set.pids[k : k + 8]) for k in range(0, len(part_set.pids), 8)]
+        lines += set_lines("SET_PART_LIST", part_set.sid, part_set.name, part_set.pids)
+    for keyword, sets, numbers in (
+        ("SET_NODE_LIST", deck.node_sets, deck.node_ids),
+        ("SET_SOLID", deck.element_sets, deck.element_ids),
+    ):
+        for numbered in sets:
+            lines += set_lines(keyword, numbered.sid, numbered.name, numbers[numbered.rows].tolist())
+    lines += contact_lines(deck) + cable_lines(deck)
     for velocity in deck.initial_velocities:
         p, q = np.array(velocity.p_m), np.array(velocity.q_m)
         direction = (q - p) / np.sqrt(np.sum((q - p) ** 2))
         lines += [
             "*INITIAL_VELOCITY_GENERATION",
             "$ styp 1: part set; the axis passes through P (xc, yc, zc) along Q - P (nx, ny, nz)",
-            _fields("id", "styp", "omega", "vx", "vy", "vz"),
-            _card(velocity.set_id, 1, velocity.omega_rad_per_s, *velocity.velocity_m_per_s),
-            _fields("xc", "yc", "zc", "nx", "ny", "nz", "phase"),
-            _card(*p, *direction, 0),
+            field_names("id", "styp", "omega", "vx", "vy", "vz"),
+            card(velocity.set_id, 1, velocity.omega_rad_per_s, *velocity.velocity_m_per_s),
+            field_names("xc", "yc", "zc", "nx", "ny", "nz", "phase"),
+            card(*p, *direction, 0),
         ]
     lines += _driver_lines(deck)
     for lead, follower in tied_rigid_parts(deck):
-        lines += ["*CONSTRAINED_RIGID_BODIES", "$ rigid parts that share nodes are one body", _card(lead, follower)]
-    for include in includes:
-        lines += ["*INCLUDE", include]
+        lines += ["*CONSTRAINED_RIGID_BODIES", "$ rigid parts that share nodes are one body", card(lead, follower)]
     return "\n".join([*lines, "*END"]) + "\n"
+
+
+def _control_lines(c: DeckControls) -> list[str]:
+    """Controls and outputs (the article's section 3.3)."""
+    return [
+        "*CONTROL_UNITS",
+        field_names("length", "time", "mass", "temp"),
+        card("m", "sec", "kg", "k"),
+        "*CONTROL_TERMINATION",
+        field_names("endtim"),
+        card(c.termination_time_s),
+        "*CONTROL_TIMESTEP",
+        "$ dt2ms < 0: mass is added to elements below this step; tssfac is the article's time step scale factor",
+        field_names("dtinit", "tssfac", "isdo", "tslimt", "dt2ms"),
+        card(0.0, c.time_step_factor, 0, 0.0, -c.mass_scaling_time_step_s),
+        "*CONTROL_HOURGLASS",
+        "$ ihq 4: stiffness form, for all parts",
+        field_names("ihq", "qh"),
+        card(c.hourglass_method, c.hourglass_coefficient),
+        "*CONTROL_BULK_VISCOSITY",
+        field_names("q1", "q2", "type"),
+        card(c.bulk_viscosity_quadratic, c.bulk_viscosity_linear, 1),
+        "*CONTROL_ENERGY",
+        field_names("hgen", "rwen", "slnten", "rylen"),
+        card(2, 2, 2, 2),
+        "*DATABASE_GLSTAT",
+        card(c.history_interval_s),
+        "*DATABASE_MATSUM",
+        card(c.history_interval_s),
+        "*DATABASE_RBDOUT",
+        card(c.history_interval_s),
+        "*DATABASE_RCFORC",
+        card(c.history_interval_s),
+        "*DATABASE_SLEOUT",
+        card(c.history_interval_s),
+        "*DATABASE_BINARY_D3PLOT",
+        card(c.plot_interval_s),
+    ]
+
+
+def contact_lines(deck: DeckInput) -> list[str]:
+    """One contact a friction pair, and one of everything with itself; none where parts share nodes instead."""
+    if not deck.contact:
+        return []
+    sets = {part_set.sid for part_set in deck.part_sets}
+    of_type = {friction.number: friction for friction in deck.friction_types}
+    lines = []
+    for number, pair in enumerate(deck.friction_pairs, 1):
+        friction = of_type[pair.friction_type]
+        sides = [(2 if side in sets else 3) for side in (pair.first, pair.second)]
+        lines += ["*CONTACT_AUTOMATIC_SURFACE_TO_SURFACE_ID", f"{number:10d}{pair.name[:70]}"]
+        lines += [field_names("ssid", "msid", "sstyp", "mstyp"), card(pair.first, pair.second, *sides)]
+        lines += [field_names("fs", "fd"), card(friction.static, friction.dynamic), card(1.0, 1.0)]
+    lines += ["*CONTACT_AUTOMATIC_SINGLE_SURFACE_ID", f"{len(deck.friction_pairs) + 1:10d}everything"]
+    return [*lines, field_names("ssid", "msid", "sstyp", "mstyp"), card(0, 0, 5, 0), card(0.0, 0.0), card(1.0, 1.0)]
+
+
+def cable_lines(deck: DeckInput) -> list[str]:
+    """Straps as discrete elements whose force grows with elongation beyond the slack, and is zero in compression."""
+    lines: list[str] = []
+    for k, cable in enumerate(deck.cables):
+        number, (a, b) = _CABLE_BASE + k, deck.node_ids[[cable.first, cable.second]].tolist()
+        reach = cable.slack_m + _CABLE_REACH_M
+        lines += ["*PART", cable.name[:80], field_names("pid", "secid", "mid"), card(number, number, number)]
+        lines += ["*SECTION_DISCRETE", field_names("secid", "dro"), card(number, 0), card(0.0, 0.0)]
+        lines += ["*MAT_SPRING_NONLINEAR_ELASTIC", field_names("mid", "lcd"), card(number, number)]
+        points = (-_CABLE_REACH_M, cable.slack_m, reach)
+        lines += curve_lines(number, points, (0.0, 0.0, cable.stiffness_n_per_m * _CABLE_REACH_M))
+        lines += ["*ELEMENT_DISCRETE", f"{number:8d}{number:8d}{a:8d}{b:8d}"]
+    return lines
 
 
 def mesh_text(deck: DeckInput, assembly: str) -> str:
@@ -134,23 +210,15 @@ def mesh_text(deck: DeckInput, assembly: str) -> str:
     if assembly != "head":
         head = [k for k, part in enumerate(deck.parts) if part.assembly == "head"]
         used[deck.hexes[np.isin(deck.element_part, head)]] = False
-    lines = ["*KEYWORD", f"$ {assembly}: {int(mine.sum())} solid elements; units: m, kg, s, N, Pa, J (SI)", "*NODE"]
-    lines += [
-        f"{i:8d}{_number(x, 16)}{_number(y, 16)}{_number(z, 16)}{0:8d}{0:8d}"
-        for i, (x, y, z) in zip(deck.node_ids[used].tolist(), deck.nodes[used].tolist())
-    ]
-    lines.append("*ELEMENT_SOLID")
-    numbers = deck.node_ids[deck.hexes[mine]]
+    lines = ["*KEYWORD", f"$ {assembly}: {int(mine.sum())} solid elements; units: m, kg, s, N, Pa, J (SI)"]
+    lines += node_lines(deck.node_ids[used], deck.nodes[used])
     pids = np.array([part.pid for part in deck.parts])[deck.element_part[mine]]
-    lines += [
-        f"{e:8d}{p:8d}\n" + "".join(f"{n:8d}" for n in row)
-        for e, p, row in zip(deck.element_ids[mine].tolist(), pids.tolist(), numbers.tolist())
-    ]
+    lines += solid_lines(deck.element_ids[mine], pids, deck.node_ids[deck.hexes[mine]])
     for k in chosen:
         part = deck.parts[k]
-        lines += ["*PART", part.name[:80], _fields("pid", "secid", "mid"), _card(part.pid, part.pid, part.pid)]
-        lines += ["*SECTION_SOLID", "$ elform 1: one integration point", _card(part.pid, 1)]
-        lines += _material_lines(part)
+        lines += ["*PART", part.name[:80], field_names("pid", "secid", "mid"), card(part.pid, part.pid, part.pid)]
+        lines += ["*SECTION_SOLID", "$ elform 1: one integration point", card(part.pid, 1)]
+        lines += material_lines(part)
     return "\n".join([*lines, "*END"]) + "\n"
 
 
@@ -198,35 +266,67 @@ def foam_curve(parameters: Mapping[str, Any]) -> tuple[tuple[float, ...], tuple[
     return law.loading_curve()
 
 
-def _material_lines(part: DeckPart) -> list[str]:
+def material_lines(part: DeckPart) -> list[str]:
+    """The ``*MAT`` card of a part, and the curve it needs, numbered as the part.
+
+    Raises
+    ------
+    ValueError
+        For a law without a keyword.
+    """
     p, mid, density = part.parameters, part.pid, part.density_kg_per_m3
     if part.law == "elastic":
         young, nu = p["youngs_modulus_pa"], p["poisson_ratio"]
-        return ["*MAT_ELASTIC", _fields("mid", "ro", "e", "pr"), _card(mid, density, young, nu)]
+        return ["*MAT_ELASTIC", field_names("mid", "ro", "e", "pr"), card(mid, density, young, nu)]
     if part.law == "rigid":
         return [
             "*MAT_RIGID",
-            _fields("mid", "ro", "e", "pr"),
-            _card(mid, density, p["youngs_modulus_pa"], p["poisson_ratio"]),
-            _card(0.0, 0, 0),
-            _card(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            field_names("mid", "ro", "e", "pr"),
+            card(mid, density, p["youngs_modulus_pa"], p["poisson_ratio"]),
+            card(0.0, 0, 0),
+            card(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
         ]
     if part.law in ("viscohyperelastic", "fluid"):
         ratios, times = p.get("prony_ratios", ()), p.get("prony_times_s", ())
         short, long, rate = one_decay(float(p["shear_modulus_pa"]), ratios, times)
-        head = _fields("mid", "ro", "bulk", "g0", "gi", "beta")
-        return ["*MAT_VISCOELASTIC", head, _card(mid, density, p["bulk_modulus_pa"], short, long, rate)]
+        head = field_names("mid", "ro", "bulk", "g0", "gi", "beta")
+        return ["*MAT_VISCOELASTIC", head, card(mid, density, p["bulk_modulus_pa"], short, long, rate)]
+    if part.law == "brain_isv":
+        # no keyword has this law: its Maxwell element at small strain, beside the network's modulus
+        flow, share = float(p["reference_rate_per_s"]) / float(p["yield_stress_pa"]), float(p["locking_stretch"]) ** -2
+        short, network = float(p["shear_modulus_pa"]), float(p["network_modulus_pa"]) * (3 - share) / (1 - share) / 3
+        head = field_names("mid", "ro", "bulk", "g0", "gi", "beta")
+        note = f"$ {part.name}: stands for the law brain_isv, linearised at rest; no damage"
+        values = (p["bulk_modulus_pa"], short + network, network, short * flow)
+        return [note, "*MAT_VISCOELASTIC", head, card(mid, density, *values)]
     if part.law == "crushable_foam":
         strain, stress = foam_curve(p)
         tension = float(p.get("tension_cutoff_pa", p["plateau_stress_pa"]))
         return [
             "*MAT_CRUSHABLE_FOAM",
-            _fields("mid", "ro", "e", "pr", "lcid", "tsc", "damp"),
-            _card(mid, density, p["youngs_modulus_pa"], 0.0, mid, tension, 0.1),
-            *_curve_lines(mid, strain, stress),
+            field_names("mid", "ro", "e", "pr", "lcid", "tsc", "damp"),
+            card(mid, density, p["youngs_modulus_pa"], 0.0, mid, tension, 0.1),
+            *curve_lines(mid, strain, stress),
         ]
+    if part.law == "elastic_plastic":
+        return _plastic_lines(part)
     message = f"part {part.name}: the law {part.law!r} has no keyword"
     raise ValueError(message)
+
+
+def _plastic_lines(part: DeckPart) -> list[str]:
+    """*MAT_024: a tangent modulus, or the points of the hardening curve."""
+    p, mid = part.parameters, part.pid
+    young, hardening = float(p["youngs_modulus_pa"]), float(p.get("hardening_modulus_pa", 0.0))
+    tangent = young * hardening / (young + hardening)
+    strains, stresses = list(p.get("curve_strains", ())), list(p.get("curve_stresses_pa", ()))
+    lines = ["*MAT_PIECEWISE_LINEAR_PLASTICITY", field_names("mid", "ro", "e", "pr", "sigy", "etan")]
+    lines.append(card(mid, part.density_kg_per_m3, young, p["poisson_ratio"], p["yield_stress_pa"], tangent))
+    lines.append(card(0.0, 0.0, mid if strains else 0, 0, 0.0))
+    lines += [card(*[0.0] * 8), card(*[0.0] * 8)]
+    if strains:
+        lines += curve_lines(mid, (0.0, *strains), (p["yield_stress_pa"], *stresses))
+    return lines
 
 
 def _driver_lines(deck: DeckInput) -> list[str]:
@@ -238,40 +338,8 @@ def _driver_lines(deck: DeckInput) -> list[str]:
         lines += [
             "*BOUNDARY_PRESCRIBED_MOTION_RIGID",
             "$ vad 0: velocity; dof 1-3 translation, 5-7 rotation about x, y, z",
-            _fields("pid", "dof", "vad", "lcid", "sf"),
-            _card(driver.pid, dof, 0, _CURVE_BASE + k, 1.0),
-            *_curve_lines(_CURVE_BASE + k, driver.time_s.tolist(), values[:, k].tolist()),
+            field_names("pid", "dof", "vad", "lcid", "sf"),
+            card(driver.pid, dof, 0, _CURVE_BASE + k, 1.0),
+            *curve_lines(_CURVE_BASE + k, driver.time_s.tolist(), values[:, k].tolist()),
         ]
     return lines
-
-
-def _curve_lines(number: int, abscissa: Sequence[float], ordinate: Sequence[float]) -> list[str]:
-    points = [f"{_number(a, 20)}{_number(o, 20)}" for a, o in zip(abscissa, ordinate)]
-    return ["*DEFINE_CURVE", _fields("lcid"), _card(number), *points]
-
-
-def _fields(*names: str) -> str:
-    return ("$#" + "".join(f"{name:>10}" for name in names)[2:]).rstrip()
-
-
-def _card(*values: float) -> str:
-    """Ten-column fields."""
-    return "".join(f"{v:10d}" if isinstance(v, int | np.integer) else _number(float(v), 10) for v in values)
-
-
-def _number(value: float, width: int) -> str:
-    """As many digits as fit a field with one blank before it."""
-    if not math.isfinite(value):
-        message = f"{value} cannot stand in a deck"
-        raise ValueError(message)
-    for digits in range(17, 0, -1):
-        text = f"{value:.{digits}g}"
-        if "." not in text and "e" not in text:
-            text += "."
-        if "e" in text:
-            mantissa, exponent = text.split("e")
-            text = f"{mantissa}e{int(exponent)}"
-        if len(text) < width:
-            return text.rjust(width)
-    message = f"{value} does not fit {width} columns"
-    raise ValueError(message)

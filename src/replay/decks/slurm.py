@@ -19,7 +19,7 @@ def write_submit(folder: Path, job: str, command: str, cores: int = 16, hours: i
     job
         Name of the job.
     command
-        The solver's command line.
+        The solver's command lines.
     cores, hours
         What is asked for.
     """

@@ -17,6 +17,8 @@ CHECKS = (
     "wedge_share",
     "removed_not_wedge",
     "missing_interfaces",
+    "unusable_parts",
+    "colliding_ids",
     "min_volume_m3",
     "min_scaled_jacobian",
 )
@@ -39,6 +41,8 @@ def helmet_gate(inspection: Mapping[str, Any], limits: Limits) -> Gate:
         - ``removed_not_wedge``: elements removed that were no wedges.
         - ``missing_interfaces``: sets missing among pads, pad-pad, facemask mounts and
           strap anchors.
+        - ``unusable_parts``: parts without a definition, a material, or a law of ours.
+        - ``colliding_ids``: numbers of nodes, elements, parts and other things given twice.
         - ``min_volume_m3``, ``min_scaled_jacobian``: over all elements.
     """
     judge = Judge("helmet", limits)

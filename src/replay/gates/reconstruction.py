@@ -26,6 +26,10 @@ VIDEO_CHECKS = (
     "angular_cutoff_over_nyquist",
     "focal_cutoff_over_nyquist",
     "helmet_to_com_m",
+    "posterior_flip_margin",
+    "posterior_peak_over_null",
+    "peak_omega_resolved",
+    "bands_calibrated",
 )
 WEARABLE_CHECKS = (
     "sampling_rate_hz",
@@ -66,6 +70,10 @@ def video_reconstruction_gate(quality: Mapping[str, Any], limits: Limits) -> Gat
         - ``peak_over_null``: peak angular velocity over the one that noise alone shows.
         - ``linear_``, ``angular_``, ``focal_cutoff_over_nyquist``: 2 fc / fps.
         - ``helmet_to_com_m``: length of the offset from landmarks' origin to skull CG.
+        - ``posterior_flip_margin``: log odds of the whole path against its mirrored twin.
+        - ``posterior_peak_over_null``: posterior mode's peak angular velocity over the one that noise alone shows.
+        - ``peak_omega_resolved``: whether its band is narrow enough to be a measurement.
+        - ``bands_calibrated``: whether the bands were made to cover on footage like this (band coverage class).
     """
     values = dict(quality)
     freedom, sigma = values.get("degrees_of_freedom_min"), values.get("focal_sigma_log")

@@ -3,6 +3,7 @@
 from replay.measures.action import ACTION_TABLE, crossover_time, kinetic_energy_of, mechanical_action, write_action
 from replay.measures.agreement import Agreement, Digitisation, agreement
 from replay.measures.brain import BrainRecorder, read_snapshots, regional_summary
+from replay.measures.damage import DAMAGE_VOLUME_TABLE, DamageRecorder, damage_summary
 from replay.measures.fidelity import Motion, compare, fidelity
 from replay.measures.head import bric, damage_deflection, hic, peak, resultant, severity_index
 from replay.measures.kinematics import head_measures
@@ -21,8 +22,10 @@ from replay.measures.strain import (
 
 __all__ = [
     "ACTION_TABLE",
+    "DAMAGE_VOLUME_TABLE",
     "Agreement",
     "BrainRecorder",
+    "DamageRecorder",
     "Digitisation",
     "Motion",
     "Rating",
@@ -32,6 +35,7 @@ __all__ = [
     "compare",
     "crossover_time",
     "damage_deflection",
+    "damage_summary",
     "fidelity",
     "green_lagrange",
     "head_measures",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from replay.models.build import build_model
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
+from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
 from replay.models.model import Model, Part, read_model, write_model
 from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
 from replay.models.submodel import select_assembly
@@ -24,8 +25,12 @@ __all__ = [
     "Part",
     "assembly_inspection",
     "assembly_mass",
+    "brain_material",
+    "brain_parameters",
+    "brain_sets",
     "build_model",
     "helmet_inspection",
+    "load_materials",
     "mass_report",
     "parts_table",
     "read_model",

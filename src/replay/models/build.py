@@ -15,7 +15,7 @@ from replay.models.helmet import helmet_mesh
 from replay.models.helmet_layout import PADS, helmet_layout
 from replay.models.mass import mass_properties
 from replay.models.materials import MATERIAL_OF_ROLE
-from replay.models.model import Model, Part
+from replay.models.model import GRID_DECIMALS, Model, Part
 from replay.models.ogrid import RESOLUTIONS, TISSUES, HeadMesh, head_mesh
 from replay.models.quality import shape_functions
 from replay.models.regions import REGION_NAMES, label_regions
@@ -64,6 +64,7 @@ def build_model(
     *,
     helmet: bool = True,
     helmet_structure: str = "rigid",
+    brain: str = "brain_isv",
 ) -> Model:
     """Build head and helmet.
 
@@ -79,6 +80,8 @@ def build_model(
         False for a bare head.
     helmet_structure
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
+    brain
+        Law of the brain: ``brain_isv`` or ``viscohyperelastic``.
 
     Returns
     -------
@@ -103,6 +106,7 @@ def build_model(
         raise ValueError(message)
     nodes, hexes, names, mounts, cup = _mesh(head, resolution, helmet)
     nodes, moved = relocate_worst_nodes(nodes, hexes, target=_QUALITY_TARGET)
+    nodes = np.round(nodes, GRID_DECIMALS)
     parts = tuple(part for part in part_table() if part.name in set(names.tolist()))
     index = {part.name: k for k, part in enumerate(parts)}
     element_part = np.array([index[name] for name in names.tolist()], dtype=np.int32)
@@ -111,7 +115,7 @@ def build_model(
     regions = np.zeros(len(hexes), dtype=np.int32)
     in_brain = np.array([part.role == "brain" for part in parts])[element_part]
     regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
-    calibration = calibrate_densities(nodes, hexes, element_part, parts, head, target)
+    calibration = calibrate_densities(nodes, hexes, element_part, parts, head, target, brain)
     materials = calibration.materials
     if helmet_structure == "rigid":
         for part in parts:
@@ -120,10 +124,11 @@ def build_model(
     density = np.array([materials[part.material]["density_kg_per_m3"] for part in parts])[element_part]
     in_head = np.array([part.assembly == "head" for part in parts])[element_part]
     cg = mass_properties(nodes, hexes[in_head], density[in_head]).cg_m
+    cg = np.round(cg, GRID_DECIMALS)
     cg[1] = 0.0  # the head is symmetric; the sum of its elements only nearly so
     sets, set_ids = _part_sets(parts)
     return Model(
-        nodes=nodes - cg,
+        nodes=np.round(nodes - cg, GRID_DECIMALS) + 0.0,  # no negative zeros
         node_ids=_numbers(hexes, in_head, len(nodes)),
         hexes=hexes.astype(np.int32),
         element_ids=_element_ids(in_head),

@@ -50,6 +50,7 @@ def calibrate_densities(
     parts: tuple[Part, ...],
     head: HeadPreset,
     helmet_mass_kg: float,
+    brain: str,
 ) -> Calibration:
     """Find the density of every material.
 
@@ -63,8 +64,10 @@ def calibrate_densities(
         Masses and targets.
     helmet_mass_kg
         Of all helmet parts together.
+    brain
+        Law of the brain.
     """
-    library = load_materials()
+    library = load_materials(brain)
     volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
     nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
     before = volume * nominal
@@ -77,7 +80,8 @@ def calibrate_densities(
         rows = [k for k, p in enumerate(parts) if p.role == role]
         factor |= {parts[k].material: mass / before[rows].sum() for k in rows}
     rest = tuple(role for role in BALANCED_ROLES if role not in head.part_mass_kg)
-    factor |= _balanced(nodes, hexes, element_part, parts, head, rest, factor)
+    present = nominal * [factor.get(p.material, 1.0) for p in parts]
+    factor |= _balanced(nodes, hexes, element_part, parts, head, rest, present)
     materials: dict[str, dict[str, Any]] = {}
     for part in parts:
         material = dict(library[part.material])
@@ -106,10 +110,9 @@ def _balanced(
     parts: tuple[Part, ...],
     head: HeadPreset,
     roles: tuple[str, ...],
-    known: dict[str, float],
+    density_kg_per_m3: np.ndarray,
 ) -> dict[str, float]:
     """Factors of the materials of `roles` that give the head its mass, its centre of gravity near the target."""
-    library = load_materials()
     target = np.array(head.surfaces.tragion_m) + np.array(head.cg_from_tragion_m)
     fixed_mass, fixed_moment = 0.0, np.zeros(2)
     free: dict[str, np.ndarray] = {}
@@ -117,8 +120,7 @@ def _balanced(
         here = element_part == k
         if part.assembly != "head" or not here.any():
             continue
-        density = library[part.material]["density_kg_per_m3"] * known.get(part.material, 1.0)
-        body = mass_properties(nodes, hexes[here], np.full(int(here.sum()), density))
+        body = mass_properties(nodes, hexes[here], np.full(int(here.sum()), density_kg_per_m3[k]))
         moment = body.mass_kg * (body.cg_m - target)[[0, 2]]
         if part.role in roles:
             free.setdefault(part.material, np.zeros(3))

@@ -104,6 +104,11 @@ def helmet_inspection(model: Model, *, helmet_cg_in_datum_m: np.ndarray | None =
         "removed_not_wedge": 0,
         "missing_interfaces": len(missing),
         "missing_interfaces_detail": ", ".join(missing),
+        "unusable_parts": 0,
+        "colliding_ids": len(model.node_ids)
+        + len(model.element_ids)
+        - len(np.unique(model.node_ids))
+        - len(np.unique(model.element_ids)),
         "min_volume_m3": float(hex_volumes(model.nodes, hexes).min()),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, hexes).min()),
     }

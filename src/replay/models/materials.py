@@ -24,9 +24,58 @@ MATERIAL_OF_ROLE = {
 }
 
 
-def load_materials() -> dict[str, dict[str, Any]]:
-    """Read the materials: name to law, density, parameters, certainty of each number, source."""
-    return load_data("materials.yaml")
+#: Laws of the brain: how its material is found.
+BRAIN_LAWS = ("brain_isv", "viscohyperelastic")
+
+
+def load_materials(brain: str = "brain_isv") -> dict[str, dict[str, Any]]:
+    """Read the materials: name to law, density, parameters, certainty of each number, source.
+
+    Parameters
+    ----------
+    brain
+        Law of the brain, one of `BRAIN_LAWS`.
+
+    Raises
+    ------
+    ValueError
+        For another law.
+    """
+    if brain not in BRAIN_LAWS:
+        message = f"no brain of the law {brain!r}; there are {', '.join(BRAIN_LAWS)}"
+        raise ValueError(message)
+    materials = load_data("materials.yaml")
+    return materials | {"brain": brain_material()} if brain == "brain_isv" else materials
+
+
+def brain_parameters() -> dict[str, dict[str, Any]]:
+    """Parameters of the brain's law: name to symbol, unit, bounds of a fit, certainty and meaning."""
+    return load_data("brain.yaml")["parameters"]
+
+
+def brain_sets() -> tuple[str, ...]:
+    """Names of the parameter sets of the brain's law."""
+    return tuple(load_data("brain.yaml")["sets"])
+
+
+def brain_material(name: str = "compression") -> dict[str, Any]:
+    """One of the parameter sets of the brain's law ``brain_isv``, in the form of `load_materials`.
+
+    Parameters
+    ----------
+    name
+        Name of the set in ``data/brain.yaml``; the default is argued for in docs/physics.md.
+    """
+    data = load_data("brain.yaml")
+    chosen, density = data["sets"][name], data["density_kg_per_m3"]
+    certainty = {key: facts["certainty"] for key, facts in data["parameters"].items()}
+    return {
+        "law": "brain_isv",
+        "density_kg_per_m3": density["value"],
+        "parameters": dict(chosen["values"]),
+        "certainty": {"density_kg_per_m3": density["certainty"], **certainty},
+        "source": chosen["source"],
+    }
 
 
 def wave_speed_m_per_s(material: Mapping[str, Any]) -> float:

@@ -22,7 +22,23 @@ from replay.files import atomic_path
 SCHEMA = "replay-model"
 SCHEMA_VERSION = 1
 
-ROLES = ("brain", "csf", "skull", "scalp", "face", "comfort_pad", "energy_pad", "shell", "facemask", "chin_cup")
+GRID_DECIMALS = 9
+"""Coordinates lie on a grid of a nanometre: any deck's columns hold them, and a rotation there and back finds them."""
+
+ROLES = (
+    "brain",
+    "csf",
+    "skull",
+    "scalp",
+    "face",
+    "comfort_pad",
+    "energy_pad",
+    "shell",
+    "facemask",
+    "chin_cup",
+    "strap",
+    "other",
+)
 
 _DATASETS = {
     "nodes/coordinates_m": ("nodes", "f8", 3),

@@ -10,12 +10,27 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from replay.files import write_text
+from replay.motion.bands import band
 from replay.motion.clip import load_clip
-from replay.motion.driver import axis_points, build_driver
-from replay.motion.kinematics import STANDARD_GRAVITY, Kinematics
+from replay.motion.driver import Driver, axis_points, build_driver
+from replay.motion.kinematics import KINEMATICS, Kinematics
 from replay.motion.null import null_peaks
+from replay.motion.posterior import PosteriorMotion, reconstruct_posterior
 from replay.motion.protocol import ProtocolMotion, along_ray, peak_frame, reconstruct_clicks
 from replay.motion.quality import FrameQuality, ReconstructionQuality, frame_quality, video_quality, wearable_quality
+from replay.motion.side_by_side import (
+    CLICK_WEIGHTS,
+    KINEMATICS_BOTH,
+    PEAKS,
+    PosteriorQuality,
+    advice,
+    click_weights,
+    curves,
+    peak_rows,
+    posterior_quality,
+    spin_band,
+)
+from replay.motion.summary import summary
 from replay.motion.wearable import read_wearable, reconstruct_wearable
 from replay.play import ClicksSource, Play, WearableSource
 from replay.tables import Column, TableFormat
@@ -51,6 +66,7 @@ POSES = TableFormat(
 INITIAL_CONDITIONS = TableFormat(
     "initial conditions",
     (
+        Column("mode", "protocol, posterior or wearable", kind="text"),
         Column("instant", "t0, or window_start: the first sample of the driver", kind="text"),
         Column("time_s", "time on the clock of kinematics.csv [s]"),
         *_vector("{}_m", "of the skull CG, global [m]"),
@@ -62,9 +78,11 @@ INITIAL_CONDITIONS = TableFormat(
         *_vector("q{}_axis_m", "of Q, one metre along the axis [m]"),
         Column("a_m_per_s2", "resultant CG acceleration [m/s^2]"),
         Column("alpha_rad_per_s2", "resultant angular acceleration [rad/s^2]"),
+        Column("spin_lo_rad_per_s", "lower end of the spin's 95 % band [rad/s]", may_be_empty=True),
+        Column("spin_hi_rad_per_s", "upper end of the spin's 95 % band [rad/s]", may_be_empty=True),
     ),
 )
-"""Format of ``initial_conditions_t0.csv``."""
+"""Format of ``initial_conditions_t0.csv``: protocol mode, then posterior mode where there is one."""
 
 QC = TableFormat(
     "quality per frame",
@@ -84,6 +102,10 @@ QC = TableFormat(
         ),
         Column("flip_ratio", "residual of the best other pose over that of the chosen one", may_be_empty=True),
         Column("candidates", "distinct poses that fit", may_be_empty=True),
+        Column("posterior_rmse_px", "posterior mode: sqrt(sum |e|^2 / n) [px]", may_be_empty=True),
+        Column("least_click_weight", "posterior mode: weight of the frame's least supported click", may_be_empty=True),
+        Column("sigma_rotation_deg", "posterior mode: standard deviation of the orientation, worst axis [deg]"),
+        Column("sigma_log_depth", "posterior mode: standard deviation of the logarithm of the distance"),
         Column("a_across_ray_m_per_s2", "CG acceleration across the line of sight, magnitude [m/s^2]"),
         Column("a_along_ray_m_per_s2", "CG acceleration along the line of sight, away positive [m/s^2]"),
         Column("a_check_difference_m_per_s2", "CG acceleration less a + alpha x r + omega x (omega x r) [m/s^2]"),
@@ -108,6 +130,12 @@ class Reconstruction:
         Numbers for the gate.
     tables
         Further files by name: format and columns.
+    posterior, posterior_quality
+        Posterior mode's motions, and what they are worth; None for a wearable.
+    columns
+        Further columns of ``kinematics.csv``: posterior mode's curves with their bands.
+    notes
+        Lines for the summary: what is resolved, what is not, what would help.
     """
 
     play: Play
@@ -117,11 +145,49 @@ class Reconstruction:
     t0_linear_s: float
     quality: ReconstructionQuality
     tables: dict[str, tuple[TableFormat, dict[str, Any]]] = field(default_factory=dict)
+    posterior: PosteriorMotion | None = None
+    posterior_quality: PosteriorQuality | None = None
+    columns: dict[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def driving(self) -> tuple[Kinematics, float]:
+        """Motion that drives the replay, by the play's choice, and its t0 [s]."""
+        if self.play.reconstruction.mode == "protocol" or self.posterior is None:
+            return self.kinematics, self.t0_s
+        motion = self.posterior.draws.motion(self.posterior.central)
+        return motion, self.posterior_t0_s
+
+    @property
+    def posterior_t0_s(self) -> float:
+        """Impact reference of the play in posterior mode [s]."""
+        assert self.posterior is not None
+        if self.play.t0 == "angular":
+            return band("t0_s", self.posterior.peaks["t0_s"]).value
+        motion = self.posterior.draws.motion(self.posterior.central)
+        return float(motion.time_s[peak_frame(motion.linear_resultant)])
+
+    def drivers(self) -> list[Driver]:
+        """Drivers of the play's ensemble: motions that the clip allows, evenly through the draws.
+
+        Raises
+        ------
+        InputError
+            When the play's window runs past the data.
+        """
+        count = self.play.reconstruction.ensemble
+        if self.posterior is None or not count:
+            return []
+        picked = np.linspace(0, len(self.posterior.draws.omega_rad_per_s) - 1, count).round().astype(int)
+        _, t0 = self.driving
+        return [build_driver(self.posterior.draws.motion(int(d)), t0, self.play.window) for d in picked]
 
     @property
     def files(self) -> tuple[str, ...]:
         """Names of the files that `write` makes."""
-        return ("kinematics.csv", "initial_conditions_t0.csv", *self.tables, "qc_summary.txt")
+        more = ("posterior_motion.csv",) if self.posterior is not None else ()
+        ensemble = tuple(f"drivers/driver_{i:03d}.csv" for i in range(1, self.play.reconstruction.ensemble + 1))
+        return ("kinematics.csv", "initial_conditions_t0.csv", *self.tables, *more, *ensemble, "qc_summary.txt")
 
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write the reconstruction's files and return their paths.
@@ -132,35 +198,64 @@ class Reconstruction:
             When the play's window runs past the data.
         """
         folder = Path(folder)
-        conditions = self._conditions()
-        self.kinematics.write(folder / "kinematics.csv")
+        conditions, drivers = self._conditions(), self.drivers()
+        if self.posterior is None:
+            self.kinematics.write(folder / "kinematics.csv")
+        else:
+            KINEMATICS_BOTH.write(folder / "kinematics.csv", {**self.kinematics.columns(), **self.columns})
+            central = self.posterior.draws.motion(self.posterior.central)
+            KINEMATICS.write(folder / "posterior_motion.csv", central.columns())
         INITIAL_CONDITIONS.write(folder / "initial_conditions_t0.csv", conditions)
         for name, (form, columns) in self.tables.items():
             form.write(folder / name, columns)
+        for i, driver in enumerate(drivers, start=1):
+            driver.motion.write_driver(folder / "drivers" / f"driver_{i:03d}.csv")
         write_text(folder / "qc_summary.txt", summary(self))
         return tuple(folder / name for name in self.files)
 
     def _conditions(self) -> dict[str, list[Any]]:
-        driver = build_driver(self.kinematics, self.t0_s, self.play.window)
-        at = int(np.argmin(np.abs(self.kinematics.time_s - self.t0_s)))
         out: dict[str, list[Any]] = {name: [] for name in INITIAL_CONDITIONS.names}
-        for instant, time, motion, row in (
-            ("t0", self.t0_s, self.kinematics, at),
-            ("window_start", driver.start_s, driver.motion, 0),
-        ):
-            columns = motion.columns()
-            axis = axis_points(motion.position_m[row], motion.omega_rad_per_s[row])
-            p, q = np.asarray(axis["P_m"]), np.asarray(axis["Q_m"])
-            values: dict[str, Any] = {
-                "instant": instant,
-                "time_s": float(time),
-                "spin_rad_per_s": axis["spin_rad_per_s"],
-            }
-            for i, a in enumerate("xyz"):
-                values[f"p{a}_m"], values[f"q{a}_axis_m"] = float(p[i]), float(q[i])
-            for name in out:
-                out[name].append(values[name] if name in values else float(columns[name][row]))
+        mode = "wearable" if self.posterior is None else "protocol"
+        driver = build_driver(self.kinematics, self.t0_s, self.play.window)
+        self._add_conditions(out, mode, "t0", self.t0_s, self.kinematics)
+        self._add_conditions(out, mode, "window_start", driver.start_s, driver.motion, row=0)
+        if self.posterior is not None:
+            motion, t0 = self.posterior.draws.motion(self.posterior.central), self.posterior_t0_s
+            start = t0 - self.play.window.before_t0_s
+            # where footage resolves no instant, the window may begin before the clip
+            for instant, time in (("t0", t0), ("window_start", max(start, float(motion.time_s[0])))):
+                self._add_conditions(out, "posterior", instant, time, motion)
         return out
+
+    def _add_conditions(
+        self,
+        out: dict[str, list[Any]],
+        mode: str,
+        instant: str,
+        time: float,
+        motion: Kinematics,
+        row: int | None = None,
+    ) -> None:
+        at = int(np.argmin(np.abs(motion.time_s - time))) if row is None else row
+        columns = motion.columns()
+        axis = axis_points(motion.position_m[at], motion.omega_rad_per_s[at])
+        p, q = np.asarray(axis["P_m"]), np.asarray(axis["Q_m"])
+        low = high = float("nan")
+        if mode == "posterior":
+            assert self.posterior is not None
+            low, high = spin_band(self.posterior, at)
+        values: dict[str, Any] = {
+            "mode": mode,
+            "instant": instant,
+            "time_s": float(time),
+            "spin_rad_per_s": axis["spin_rad_per_s"],
+            "spin_lo_rad_per_s": low,
+            "spin_hi_rad_per_s": high,
+        }
+        for i, a in enumerate("xyz"):
+            values[f"p{a}_m"], values[f"q{a}_axis_m"] = float(p[i]), float(q[i])
+        for name in out:
+            out[name].append(values[name] if name in values else float(columns[name][at]))
 
 
 def check_tracks(play: Play) -> dict[str, Any]:
@@ -208,6 +303,11 @@ def _from_clicks(play: Play, source: ClicksSource) -> Reconstruction:
     null = null_peaks(motion, tracks, template, camera, k.time_s < t0 - 0.015)
     frames = frame_quality(motion, tracks, camera)
     quality = video_quality(motion, frames, tracks, camera, null)
+    posterior = reconstruct_posterior(tracks, template, camera, motion, null=True)
+    worth = posterior_quality(posterior, tracks, camera)
+    quality = replace(quality, values={**quality.values, **worth.gate_values()})
+    peaks = {**quality.peaks, "t0_s": angular}
+    scale = float(np.nanmedian(frames.scale_px_per_m))
     return Reconstruction(
         play=play,
         kinematics=k,
@@ -217,8 +317,14 @@ def _from_clicks(play: Play, source: ClicksSource) -> Reconstruction:
         quality=replace(quality, warnings=(*clip.warnings, *quality.warnings)),
         tables={
             "poses_per_frame.csv": (POSES, _pose_columns(motion)),
-            "qc_per_frame.csv": (QC, _qc_columns(motion, frames)),
+            "qc_per_frame.csv": (QC, _qc_columns(motion, frames, posterior)),
+            "peaks.csv": (PEAKS, peak_rows(worth, peaks, quality.null_peaks)),
+            "click_weights.csv": (CLICK_WEIGHTS, click_weights(posterior, tracks, template)),
         },
+        posterior=posterior,
+        posterior_quality=worth,
+        columns=curves(posterior, len(tracks.frames)),
+        notes=tuple(advice(worth, tracks, camera, scale)),
     )
 
 
@@ -243,10 +349,14 @@ def _pose_columns(motion: ProtocolMotion) -> dict[str, Any]:
     }
 
 
-def _qc_columns(motion: ProtocolMotion, frames: FrameQuality) -> dict[str, Any]:
+def _qc_columns(motion: ProtocolMotion, frames: FrameQuality, posterior: PosteriorMotion) -> dict[str, Any]:
     k = motion.kinematics
     along, across = along_ray(k)
     difference = np.linalg.norm(k.acceleration_m_per_s2 - motion.acceleration_check_m_per_s2, axis=1)
+    batch = posterior.batch
+    seen = np.isfinite(batch.errors_px[..., 0])
+    squared = np.sum(np.nan_to_num(batch.errors_px) ** 2, axis=(1, 2))
+    none = ~seen.any(axis=1)
     return {
         "frame": motion.frames,
         "time_s": k.time_s,
@@ -261,6 +371,10 @@ def _qc_columns(motion: ProtocolMotion, frames: FrameQuality) -> dict[str, Any]:
         "baseline_drift_percent": frames.baseline_drift_percent,
         "flip_ratio": frames.flip_ratio,
         "candidates": frames.candidates,
+        "posterior_rmse_px": np.where(none, np.nan, np.sqrt(squared / np.maximum(seen.sum(axis=1), 1))),
+        "least_click_weight": np.where(none, np.nan, np.where(seen, batch.weights, np.inf).min(axis=1)),
+        "sigma_rotation_deg": np.degrees(np.sqrt(np.linalg.eigvalsh(batch.covariance[:, :3, :3])[:, -1])),
+        "sigma_log_depth": np.sqrt(batch.covariance[:, 5, 5]),
         "a_across_ray_m_per_s2": across,
         "a_along_ray_m_per_s2": along,
         "a_check_difference_m_per_s2": difference,
@@ -277,54 +391,3 @@ def _from_wearable(play: Play, source: WearableSource) -> Reconstruction:
     offset = float(np.linalg.norm(source.sensor_to_cg_m))
     quality = wearable_quality(motion, offset, t0, (start, start + play.window.duration_s))
     return Reconstruction(play, k, t0, angular, linear, quality)
-
-
-_PEAK_LINES = (
-    ("omega_rad_per_s", "angular velocity", "rad/s", 1.0),
-    ("alpha_rad_per_s2", "angular acceleration", "rad/s^2", 1.0),
-    ("a_m_per_s2", "CG acceleration, resultant", "g", STANDARD_GRAVITY),
-    ("a_across_m_per_s2", "  across the line of sight", "g", STANDARD_GRAVITY),
-    ("a_along_m_per_s2", "  along the line of sight", "g", STANDARD_GRAVITY),
-)
-
-
-def summary(result: Reconstruction) -> str:
-    """One page a person reads: what was found, beside what noise alone would show."""
-    play, quality = result.play, result.quality
-    samples = "frames" if quality.kind == "clicks" else "samples"
-    angular, linear = result.t0_angular_s * 1e3, result.t0_linear_s * 1e3
-    lines = [
-        f"Reconstruction of play {play.name}",
-        f"{play.title}" if play.title else "",
-        "",
-        f"source      {quality.kind}, {quality.samples} {samples} at {quality.rate_hz:.6g} Hz",
-        f"t0          {result.t0_s * 1e3:.2f} ms ({play.t0}); angular {angular:.2f} ms, linear {linear:.2f} ms",
-        "",
-        "Peaks                              value      noise alone   ratio    at [ms]",
-    ]
-    for name, label, unit, scale in _PEAK_LINES:
-        if name not in quality.peaks:
-            continue
-        value, null = quality.peaks[name] / scale, quality.null_peaks.get(name)
-        noise = f"{null / scale:10.4g}  {quality.peaks[name] / null:8.2f}" if null else "         -         -"
-        lines.append(f"{label:28s} {value:10.4g} {unit:8s} {noise}  {quality.peak_times_s[name] * 1e3:9.2f}")
-    lines += ["", "Quality (verdicts are in gate.json)"]
-    for name, item in quality.values.items():
-        if name.endswith("_detail"):
-            continue
-        shown = f"{item:.4g}" if isinstance(item, float) else str(item)
-        lines.append(f"  {name:34s} {shown}")
-        detail = quality.values.get(f"{name}_detail")
-        if detail:
-            lines.append(f"  {'':34s} ({detail})")
-    if quality.warnings:
-        lines += ["", "Read this"]
-        lines += [f"  - {warning}" for warning in quality.warnings]
-    if quality.kind == "clicks":
-        lines += [
-            "",
-            "The noise column is the peak that a head standing still would show under the same clicks:",
-            "a peak is worth its ratio to it.",
-            "HIC is not computed from footage; it comes from the finite-element head.",
-        ]
-    return "\n".join(line.rstrip() for line in lines) + "\n"

@@ -119,6 +119,37 @@ def kinematics_charts(
     return pictures
 
 
+def both_modes_chart(kinematics: pd.DataFrame, t0_s: float | None) -> Picture:
+    """Angular velocity as both modes reconstruct it: the samples of the one, the other with its 95 % band."""
+    with house_style():
+        figure, (axes,) = new_figure(HALF)
+        t = _milliseconds(kinematics)
+        protocol, posterior, low, high = (
+            kinematics[name].to_numpy(dtype=float)
+            for name in ("omega_rad_per_s", *(f"posterior_omega_rad_per_s{end}" for end in ("", "_lo", "_hi")))
+        )
+        axes.fill_between(t, low, high, color=SKY, alpha=0.35, lw=0, label="posterior, 95 % band")
+        axes.plot(t, posterior, color=BLUE, lw=1.8, label="posterior")
+        axes.plot(t, protocol, color=VERMILION, lw=1.1, ls="--", marker="o", ms=2.6, label="protocol")
+        if t0_s is not None:
+            axes.axvline(1e3 * t0_s, color=GREY, lw=1.0, ls=":", label="t₀")
+        axes.set(xlabel=TIME_LABEL, ylabel="resultant (rad/s)", title="Angular velocity, both modes")
+        # a band that footage cannot hold would flatten both curves
+        highest = float(np.nanmax([protocol, posterior]))
+        axes.set_ylim(0, min(1.6 * highest, 1.08 * max(float(np.nanmax(high)), highest)))
+        legend_below(axes, 4)
+        widest = float(np.nanmax(high - low))
+        alt = (
+            f"Angular velocity: protocol mode up to {np.nanmax(protocol):.3g} rad/s, posterior mode at the frames "
+            f"up to {np.nanmax(posterior):.3g} rad/s; its band is at most {widest:.3g} rad/s wide."
+        )
+        caption = (
+            "The same clicks, read frame by frame with the article's filters, and as one estimate over the clip."
+            " The band says how well the footage holds the curve; what happens between frames is in the peaks' bands."
+        )
+        return finish(figure, "angular_velocity_both_modes", alt, caption)
+
+
 def energy_charts(energy: pd.DataFrame) -> list[Picture]:
     """Draw the energy ledger and its ratio."""
     t = _milliseconds(energy)

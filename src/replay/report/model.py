@@ -83,6 +83,8 @@ class ReportInput:
         The impact reference and the analysis window (start, end), on the clock of `kinematics`.
     kinematics
         kinematics.csv.
+    peaks
+        peaks.csv: both modes, where the motion comes from clicks.
     driver, applied
         driver_6dof.csv, and the skull's motion in the model with the same headings.
     fidelity
@@ -107,6 +109,8 @@ class ReportInput:
         brain_histories.csv.
     convergence_class
         ``A``, ``B``, ``C`` or ``unknown``: shown beside every strain.
+    damage, damage_sensitivity
+        damage_volume.csv, damage_sensitivity.csv; None where the brain's law has no damage variable.
     action
         action.csv.
     crossover_s
@@ -135,6 +139,7 @@ class ReportInput:
     t0_s: float | None = None
     window_s: tuple[float, float] | None = None
     kinematics: pd.DataFrame | None = None
+    peaks: pd.DataFrame | None = None
     driver: pd.DataFrame | None = None
     applied: pd.DataFrame | None = None
     fidelity: Row | None = None
@@ -148,6 +153,8 @@ class ReportInput:
     head_measures: Sequence[Row] = ()
     brain_histories: pd.DataFrame | None = None
     convergence_class: str = "unknown"
+    damage: pd.DataFrame | None = None
+    damage_sensitivity: pd.DataFrame | None = None
     action: pd.DataFrame | None = None
     crossover_s: float | None = None
     parts: Sequence[Row] = ()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from replay.files import atomic_path, write_text
 from replay.report import sections
+from replay.report.damage import damage_section
 from replay.report.figure import Picture
 from replay.report.markup import section, text
 from replay.report.model import ReportInput
@@ -49,6 +50,7 @@ def _page(report: ReportInput, pictures: list[Picture]) -> str:
         ("motion", "Head motion", sections.motion_section(report, pictures)),
         ("numerics", "Solver", sections.numerics_section(report, pictures)),
         ("brain", "Brain", sections.brain_section(report, pictures)),
+        ("damage", "Damage variable", damage_section(report, pictures)),
         ("action", "Mechanical action", sections.action_section(report, pictures)),
         ("model", "Model", sections.model_section(report, pictures)),
         ("limits", "What this run cannot show", sections.cannot_show_section(report)),

@@ -75,12 +75,48 @@ def driver_section(report: ReportInput, pictures: list[Picture]) -> str:
     return words + _figures(pictures, *drawn) + peaks_table(report.fidelity)
 
 
+_PEAK_WORDS = {
+    "omega_rad_per_s": ("Angular velocity", "rad/s", 1.0),
+    "alpha_rad_per_s2": ("Angular acceleration", "rad/s^2", 1.0),
+    "a_m_per_s2": ("Linear acceleration", "m/s^2", 1.0),
+    "a_across_m_per_s2": ("Linear acceleration across the line of sight", "m/s^2", 1.0),
+    "a_along_m_per_s2": ("Linear acceleration along the line of sight", "m/s^2", 1.0),
+    "t0_s": ("Instant of peak angular acceleration", "ms", 1e3),
+}
+
+
+def both_modes_table(report: ReportInput) -> str:
+    """Peaks of protocol mode beside those of posterior mode with their bands."""
+    if report.peaks is None:
+        return ""
+    rows = []
+    for row in report.peaks.itertuples():
+        words, measure, scale = _PEAK_WORDS[str(row.quantity)]
+        found, noise, value, low, high = (
+            scale * float(v)
+            for v in (row.protocol, row.protocol_null, row.posterior, row.posterior_lo, row.posterior_hi)
+        )
+        told = row.resolved == "yes"
+        band = f"{number(value, 3)} ({number(low, 3)} to {number(high, 3)})" if told else text(str(row.resolved))
+        rows.append([f"{words} ({unit(measure)})", number(found, 3), number(noise, 3) if noise == noise else "–", band])
+    return table(
+        "Peaks in both modes",
+        ["Quantity", "Protocol mode", "Protocol mode, head at rest", "Posterior mode (95 % band)"],
+        rows,
+        numeric=(1, 2, 3),
+        note="Protocol mode is the article's method; posterior mode reads between the frames and says how sure it is.",
+    )
+
+
 def motion_section(report: ReportInput, pictures: list[Picture]) -> str:
     """Return the reconstructed motion and its measures."""
     content = ""
     if report.kinematics is None:
         content += _not_run(report, "The reconstruction")
     else:
+        if "posterior_omega_rad_per_s" in report.kinematics:
+            content += _figures(pictures, charts.both_modes_chart(report.kinematics, report.t0_s))
+            content += both_modes_table(report)
         content += _figures(pictures, *charts.kinematics_charts(report.kinematics, report.t0_s, report.window_s))
     if report.head_measures:
         rows = [

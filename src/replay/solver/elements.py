@@ -83,11 +83,13 @@ class ElementGroup:
         self.mass = density[:, None] * reference[:, 0]
         self.physical_mass = self.mass.copy()
         used, self._row = np.unique(group.part, return_inverse=True)
-        constants = [law_parameters(problem.parts[k].material).constants() for k in used]
-        self._parameters = np.array(constants, dtype=float).reshape(len(used), law.N_CONSTANTS)
+        parameters = [law_parameters(problem.parts[k].material) for k in used]
+        self._parameters = np.array([q.constants() for q in parameters], dtype=float).reshape(-1, law.N_CONSTANTS)
         self.stress = np.ascontiguousarray(problem.initial_stress[group.rows].transpose(0, 2, 1))
         self.hourglass = np.zeros((blocks, 12, LANES))
         self.state = np.zeros((blocks, state_size(law), LANES))
+        if hasattr(law.Parameters, "initial_state"):
+            self.state[:] = np.array([q.initial_state() for q in parameters])[self._row, :, None]
         self._force = force
         self.step = np.zeros((blocks, LANES))
         self.work = np.zeros((blocks, 3))

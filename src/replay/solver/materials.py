@@ -11,11 +11,19 @@ from types import ModuleType
 from typing import Any
 
 from replay.errors import InputError
-from replay.solver.kernels.materials import crushable_foam, elastic, elastic_plastic, fluid, rigid, viscohyperelastic
+from replay.solver.kernels.materials import (
+    brain_isv,
+    crushable_foam,
+    elastic,
+    elastic_plastic,
+    fluid,
+    rigid,
+    viscohyperelastic,
+)
 
 #: The registry: a new law is a file in `kernels.materials` and a name here.
 LAWS: dict[str, ModuleType] = {
-    law.NAME: law for law in (elastic, elastic_plastic, viscohyperelastic, fluid, crushable_foam, rigid)
+    law.NAME: law for law in (elastic, elastic_plastic, viscohyperelastic, brain_isv, fluid, crushable_foam, rigid)
 }
 
 
@@ -93,6 +101,11 @@ def law_parameters(material: Material) -> Any:
         return kind(**values)
     except ValueError as error:
         raise InputError(where, str(error), column="parameters", mend="correct the value") from None
+
+
+def law_fields(law: ModuleType) -> Mapping[str, str]:
+    """Fields that a law shows beside the stress: name in outputs -> name in its ``STATE``."""
+    return getattr(law, "FIELDS", {})
 
 
 def _number(where: str, name: str, value: Any) -> float | tuple[float, ...]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.solver.materials import LAWS
+from replay.solver.materials import LAWS, law_fields
 from replay.solver.problem import Problem
 from replay.solver.time_step import StepBound
 from replay.solver.view import StateView
@@ -94,9 +94,7 @@ HISTORY_TABLE = TableFormat(
     ),
 )
 POINT_FIELDS = {"displacement_m": 3, "velocity_m_per_s": 3}
-CELL_FIELDS = {"stress_Pa": 6, "von_mises_Pa": 1, "pressure_Pa": 1, "volume_ratio": 1}
-#: Written where a law keeps it.
-PLASTIC_STRAIN = "equivalent_plastic_strain"
+CELL_FIELDS = {"stress_Pa": 6, "von_mises_Pa": 1, "pressure_Pa": 1, "lode": 1, "volume_ratio": 1}
 
 
 class Histories:
@@ -184,13 +182,11 @@ class States:
     def __init__(self, problem: Problem, folder: Path, volume: NDArray[np.float64], *, resume_at: int | None) -> None:
         pid = np.array([part.pid for part in problem.parts])[problem.element_part]
         self._volume = volume
-        self._plastic = any(
-            PLASTIC_STRAIN in LAWS[part.material.law].STATE for part in problem.parts if not part.material.is_rigid
-        )
-        cells = CELL_FIELDS | ({PLASTIC_STRAIN: 1} if self._plastic else {})
+        laws = sorted({part.material.law for part in problem.parts})
+        self._law_fields = {name: kept for law in laws for name, kept in law_fields(LAWS[law]).items()}
         self._writer = StatesWriter(
             folder / "states.vtkhdf", problem.nodes, problem.hexes, problem.node_ids, problem.element_ids, pid,
-            POINT_FIELDS, cells, resume=resume_at is not None,
+            POINT_FIELDS, CELL_FIELDS | dict.fromkeys(self._law_fields, 1), resume=resume_at is not None,
         )  # fmt: skip
         if resume_at is not None:
             self._writer.rewind(resume_at)
@@ -202,17 +198,19 @@ class States:
 
     def append(self, view: StateView) -> None:
         """Add a state."""
-        fields = {
-            "displacement_m": view.displacements,
-            "velocity_m_per_s": view.velocities,
-            "stress_Pa": view.stress,
-            "von_mises_Pa": view.von_mises,
-            "pressure_Pa": view.pressure,
-            "volume_ratio": view.volumes / self._volume,
-        }
-        if self._plastic:
-            fields[PLASTIC_STRAIN] = view.variable(PLASTIC_STRAIN)
-        self._writer.append(view.time_s, fields)
+        self._writer.append(
+            view.time_s,
+            {
+                "displacement_m": view.displacements,
+                "velocity_m_per_s": view.velocities,
+                "stress_Pa": view.stress,
+                "von_mises_Pa": view.von_mises,
+                "pressure_Pa": view.pressure,
+                "lode": view.lode,
+                "volume_ratio": view.volumes / self._volume,
+                **{name: view.variable(kept) for name, kept in self._law_fields.items()},
+            },
+        )
 
     def sync(self) -> None:
         """Force the states onto the disk, before a checkpoint that counts them."""

@@ -106,6 +106,18 @@ class StateView:
         """Pressure (m,), compression positive [Pa]."""
         return -self.stress[:, :3].mean(axis=1)
 
+    @cached_property
+    def lode(self) -> NDArray[np.float64]:
+        """Third invariant ``27 J3 / (2 sigma_vm^3)`` (m,): 1 in tension, -1 in compression, 0 in shear and at rest."""
+        s = self.stress
+        d = s[:, :3] + self.pressure[:, None]
+        third = (
+            d[:, 0] * d[:, 1] * d[:, 2] + 2 * s[:, 3] * s[:, 4] * s[:, 5]
+            - d[:, 0] * s[:, 4] ** 2 - d[:, 1] * s[:, 5] ** 2 - d[:, 2] * s[:, 3] ** 2
+        )  # fmt: skip
+        cube = self.von_mises**3
+        return np.where(cube > 0, 13.5 * third / np.where(cube > 0, cube, 1.0), 0.0)
+
     def deformation_gradient(self) -> NDArray[np.float64]:
         """Mean deformation gradient (m, 3, 3): ``sum_c m_c (x) G0_c / V0``."""
         return self._deformation

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from replay import gates, models
 from replay.files import write_json
 from replay.gates.assembly import CHECKS as ASSEMBLY_CHECKS
 from replay.gates.helmet import CHECKS as HELMET_CHECKS
 from replay.stages.frame import Stage, Workspace
 from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.verdict import limits_of, told
 
 
 def run(workspace: Workspace) -> str | None:
@@ -24,6 +21,7 @@ def run(workspace: Workspace) -> str | None:
         play.model.resolution,
         helmet_mass_kg=play.helmet.mass_kg,
         helmet_structure=play.model.helmet_structure,
+        brain=play.model.brain_material,
     )
     print(models.summary_text(model))
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
@@ -40,15 +38,9 @@ def run(workspace: Workspace) -> str | None:
         {"helmet": helmet, "assembly": assembly},
     )
     judged = [
-        gates.helmet_gate(_told(helmet, HELMET_CHECKS), limits),
-        gates.assembly_gate(_told(assembly, ASSEMBLY_CHECKS), limits),
+        gates.helmet_gate(told(helmet, HELMET_CHECKS), limits),
+        gates.assembly_gate(told(assembly, ASSEMBLY_CHECKS), limits),
     ]
     judged[0].write(stage.write("gate_helmet.json", "gate: helmet readiness"))
     judged[1].write(stage.write("gate.json", "gate: assembly"))
     return stage.finish(judged, parameters=dict(model.info))
-
-
-def _told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:
-    """Entries that a gate's checks name, with their details; a detail that says nothing is left out."""
-    told = {name: facts[name] for name in checks}
-    return told | {f"{name}_detail": facts[f"{name}_detail"] for name in checks if facts.get(f"{name}_detail")}

@@ -9,10 +9,16 @@ from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.play import Play
 from replay.stages.frame import Stage, Workspace
+from replay.stages.own_deck import model_facts, node_sets, region_sets
 from replay.stages.settings import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.
 _HOURGLASS_METHODS = {"stiffness": 4, "selective": 4, "viscous": 1}
+_WRITERS = (
+    ("velodyne", decks.write_velodyne),
+    ("lsdyna", decks.write_lsdyna),
+    ("openradioss", decks.write_openradioss),
+)
 _EVERYTHING = "all_parts"
 
 
@@ -26,7 +32,7 @@ def run(workspace: Workspace) -> str | None:
     driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
     deck = deck_input(play, model, driver)
     folder = stage.folder_for_many()
-    for solver, write in (("velodyne", decks.write_velodyne), ("lsdyna", decks.write_lsdyna)):
+    for solver, write in _WRITERS:
         for path in write(folder / solver, deck):
             stage.write(path.relative_to(folder).as_posix(), f"run deck for {solver}")
     return stage.finish()
@@ -67,6 +73,9 @@ def deck_input(play: Play, model: Model, driver: Kinematics) -> decks.DeckInput:
             omega_rad_per_s=driver.omega_rad_per_s,
         ),
         notes=tuple(model.info["notes"]),
+        node_sets=node_sets(model),
+        element_sets=region_sets(model),
+        facts=model_facts(model, driver.position_m[0], driver.rotation[0]),
     )
 
 

@@ -14,8 +14,9 @@ def run(workspace: Workspace) -> str | None:
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
-    kinematics = Kinematics.read(stage.read("reconstruction", "kinematics.csv"))
-    t0 = read_json(stage.read("reconstruction", "quality.json"))["t0_s"]
+    source = "kinematics.csv" if play.reconstruction.mode == "protocol" else "posterior_motion.csv"
+    kinematics = Kinematics.read(stage.read("reconstruction", source))
+    t0 = read_json(stage.read("reconstruction", "quality.json"))["driving_t0_s"]
     driver = build_driver(kinematics, t0, play.window)
     driver.write(
         stage.write_all(

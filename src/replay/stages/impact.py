@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from replay.errors import InstabilityError, ResumeError
 from replay.files import read_json
 from replay.gates import Gate, numerics_gate, part_energies
-from replay.measures import BrainRecorder
+from replay.measures import BrainRecorder, DamageRecorder
 from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
@@ -30,6 +31,11 @@ BRAIN_FILES = {
     "brain_histories.csv": "strain and stress of the brain by region over time",
     "element_peaks.csv": "peaks of every brain element",
     "brain_snapshots.h5": "strain of every brain element over time",
+}
+DAMAGE_FILES = {
+    "brain_damage.csv": "damaged volume of the brain by region over time",
+    "element_damage.csv": "damage of every brain element and its onset",
+    "damage_sensitivity.csv": "damage with other constants of pore growth",
 }
 # What an interrupted run leaves and a later one goes on from.
 UNFINISHED = ("checkpoint", "states.partial")
@@ -65,7 +71,12 @@ def run_driven(
         play, play.window.duration_s, checkpoint_every_s=checkpoint_every_s, hourglass_factor=hourglass_factor
     )
     problem = driven_problem(model, driver, controls)
-    return run_solver(stage, problem, [brain_recorder(model)], {**RUN_FILES, **BRAIN_FILES}, threads=threads)
+    files = {**RUN_FILES, **BRAIN_FILES}
+    recorders: list[Recorder] = [brain_recorder(model)]
+    if has_damage(model):
+        recorders.append(damage_recorder(model))
+        files |= DAMAGE_FILES
+    return run_solver(stage, problem, recorders, files, threads=threads)
 
 
 def run_solver(
@@ -86,10 +97,25 @@ def run_solver(
 
 def brain_recorder(model: Model) -> BrainRecorder:
     """Recorder of the brain's elements with their regions."""
+    return BrainRecorder(*_brain(model))
+
+
+def has_damage(model: Model) -> bool:
+    """Whether the brain's law keeps the damage variable."""
+    return model.materials["brain"]["law"] == "brain_isv"
+
+
+def damage_recorder(model: Model) -> DamageRecorder:
+    """Recorder of the brain's damage variable."""
+    return DamageRecorder(*_brain(model), model.materials["brain"]["parameters"])
+
+
+def _brain(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[str, NDArray[np.int64]]]:
+    """Rows of the brain's elements, their numbers, and their positions by region."""
     rows = np.flatnonzero(model.elements_of(role="brain"))
     region = model.element_region[rows]
     groups = {name: np.flatnonzero(region == k) for k, name in enumerate(model.region_names) if k > 0}
-    return BrainRecorder(rows, model.element_ids[rows], groups)
+    return rows, model.element_ids[rows], groups
 
 
 def judge_numerics(stage: Stage) -> Gate:

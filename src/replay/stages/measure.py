@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 from replay.files import write_json
 from replay.gates import convergence_class, read_gate
 from replay.measures import (
+    DAMAGE_VOLUME_TABLE,
     Motion,
     crossover_time,
+    damage_summary,
     head_measures,
     kinetic_energy_of,
     mechanical_action,
@@ -20,6 +22,7 @@ from replay.measures import (
 from replay.models import read_model
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace
+from replay.stages.impact import has_damage
 from replay.stages.verdict import limits_of
 
 
@@ -39,12 +42,20 @@ def run(workspace: Workspace) -> str | None:
         for assembly in ("head", "helmet")
     )
     write_action(stage.write("action.csv", "mechanical action of head and helmet", unit="J s"), time, head, helmet)
+    damage = None
+    if has_damage(model):
+        found = pd.read_csv(stage.read("replay", "brain_damage.csv"))
+        found["head_J_s"] = np.interp(found["time_s"], time, head)
+        path = stage.write("damage_volume.csv", "damaged volume by region against time and action", unit="m^3")
+        DAMAGE_VOLUME_TABLE.write(path, {name: found[name] for name in DAMAGE_VOLUME_TABLE.names})
+        damage = damage_summary(found)
     write_json(
         stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
         {
             "statement": "process diagnostics; no statement on injury or on a player",
             "head": head_measures(in_head_axes(skull_motion(stage, model)), file="replay/histories.csv"),
             "brain": regional_summary(brain),
+            "damage": damage,
             "brain_convergence_class": convergence_class(gate),
             "action": {
                 "unit": "J s",

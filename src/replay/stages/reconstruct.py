@@ -12,22 +12,27 @@ from replay.stages.settings import read_settings
 from replay.stages.verdict import limits_of
 
 _MEANINGS = {
-    "kinematics.csv": "motion of the skull's centre of gravity",
+    "kinematics.csv": "motion of the skull's centre of gravity; from clicks, both modes with bands",
+    "posterior_motion.csv": "posterior mode's central motion, between the frames",
+    "peaks.csv": "peaks of both modes, with bands",
+    "click_weights.csv": "weight and residual of every click in the batch estimate",
     "initial_conditions_t0.csv": "pose, velocities and axis P-Q at t0 and at the window's start",
     "poses_per_frame.csv": "pose and focal length of every frame",
     "qc_per_frame.csv": "residuals and drifts of every frame",
     "qc_summary.txt": "the quality on one page",
 }
 
+_ENSEMBLE = "a driver drawn from the posterior"
+
 
 def run(workspace: Workspace) -> str | None:
-    """Reconstruct the play in protocol mode and judge the reconstruction."""
+    """Reconstruct the play, from clicks in both modes, and judge the reconstruction."""
     stage = Stage(workspace, "reconstruction", after=["settings", "inputs"])
     play = read_settings(stage)
     for name in play.source.files:
         stage.read("inputs", name)
     result = reconstruct(play)
-    folder = stage.write_all({name: _MEANINGS[name] for name in result.files})
+    folder = stage.write_all({name: _MEANINGS.get(name, _ENSEMBLE) for name in result.files})
     result.write(folder)
     write_json(
         stage.write("quality.json", "numbers for the gate, peaks, and the peaks that noise alone shows"),
@@ -35,7 +40,9 @@ def run(workspace: Workspace) -> str | None:
             "t0_s": result.t0_s,
             "t0_angular_s": result.t0_angular_s,
             "t0_linear_s": result.t0_linear_s,
+            "driving_t0_s": result.driving[1],
             **asdict(result.quality),
+            "posterior": result.posterior_quality.document() if result.posterior_quality else None,
         },
     )
     judge = video_reconstruction_gate if result.quality.kind == "clicks" else wearable_reconstruction_gate

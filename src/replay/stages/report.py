@@ -40,8 +40,15 @@ _WITHOUT_CONTACT = (
         "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
         " and facemask forces, contact work and the action of an impactor are not computed."
     ),
-    "Damage. The brain is visco-elastic here; the article's damage variable is not computed.",
 )
+_BRAIN = {
+    "brain_isv": (
+        "The size of the damage variable. Its growth depends on the cap of the Cocks-Ashby term, which is ours, and on"
+        " m_CA and K_pore, which are assumed: the table of the damage section shows by how much. Read where and when it"
+        " grows, not how far."
+    ),
+    "viscohyperelastic": "Damage. The play asks for a visco-elastic brain, which keeps no damage variable.",
+}
 _STRUCTURE = {
     "rigid": (
         "Deformation of shell and facemask. They move as one rigid body: at this resolution one element across a"
@@ -78,13 +85,19 @@ def collect(stage: Stage) -> ReportInput:
             for name, facts in limits.protocol.items()
         },
         "stages": _stages(stage),
-        "t0_s": quality["t0_s"],
+        "t0_s": quality["driving_t0_s"],
         "kinematics": _table(stage, "reconstruction", "kinematics.csv"),
+        "peaks": _table(stage, "reconstruction", "peaks.csv") if quality["kind"] == "clicks" else None,
         "quality": _table_two(stage, limits) if quality["kind"] == "clicks" else (),
         "parts": _parts(stage, model),
         "parameters": _parameters(model),
         "mesh": _mesh(model),
-        "cannot_show": [*_WITHOUT_CONTACT, _STRUCTURE[play.model.helmet_structure], *quality["warnings"]],
+        "cannot_show": [
+            *_WITHOUT_CONTACT,
+            _BRAIN[play.model.brain_material],
+            _STRUCTURE[play.model.helmet_structure],
+            *quality["warnings"],
+        ],
         "inputs": inputs["files"],
         "provenance": _provenance(stage, model),
         "mass_scaling_time_step_s": play.solver.mass_scaling_time_step_s,
@@ -104,6 +117,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     applied = skull_motion(stage, model)
     fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
+    damaged = stage.made("measures", "damage_volume.csv")
     return {
         "applied": _columns(applied),
         "fidelity": read_json(stage.read("fidelity", "fidelity.json")),
@@ -114,6 +128,8 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "head_measures": measures["head"],
         "brain_histories": _table(stage, "replay", "brain_histories.csv"),
         "convergence_class": measures["brain_convergence_class"],
+        "damage": _table(stage, "measures", "damage_volume.csv") if damaged else None,
+        "damage_sensitivity": _table(stage, "replay", "damage_sensitivity.csv") if damaged else None,
         "action": _table(stage, "measures", "action.csv"),
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
@@ -131,7 +147,7 @@ def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> 
         "struck player": play.struck_player,
         "source": "clicked video" if play.source.kind == "clicks" else "wearable",
         "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
-        "t0": f"{1e3 * quality['t0_s']:.1f} ms (peak {play.t0} acceleration)",
+        "t0": f"{1e3 * quality['driving_t0_s']:.1f} ms (peak {play.t0} acceleration)",
         "window": f"{1e3 * play.window.duration_s:g} ms from {1e3 * play.window.before_t0_s:g} ms before t0",
         "helmet": f"{play.helmet.model}, {play.helmet.mass_kg:g} kg",
         "model": f"{play.model.preset}, {play.model.resolution}",

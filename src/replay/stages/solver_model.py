@@ -14,15 +14,12 @@ from numpy.typing import NDArray
 
 from replay.decks import read_keyword
 from replay.errors import InputError
-from replay.models import read_model
+from replay.models import Model, read_model
+from replay.models.census import KINDS, element_kinds
 from replay.solver import Material, SolverPart
+from replay.stages.foreign_deck import open_deck
+from replay.stages.own_deck import model_of_own_deck
 from replay.stages.problem import solver_parts
-
-#: Keyword of a deck's material to a law and the names of its fields after the density.
-_KEYWORD_LAWS = {
-    "*MAT_ELASTIC": ("elastic", ("youngs_modulus_pa", "poisson_ratio")),
-    "*MAT_RIGID": ("rigid", ("youngs_modulus_pa", "poisson_ratio")),
-}
 
 
 @dataclass(frozen=True)
@@ -72,7 +69,10 @@ def open_model(path: Path) -> SolverModel:
 
 
 def _from_model_file(path: Path) -> SolverModel:
-    model = read_model(path)
+    return _of_model(read_model(path))
+
+
+def _of_model(model: Model) -> SolverModel:
     return SolverModel(
         nodes=model.nodes,
         node_ids=model.node_ids,
@@ -86,43 +86,46 @@ def _from_model_file(path: Path) -> SolverModel:
 
 
 def _from_keyword(path: Path) -> SolverModel:
-    """Solids of a keyword deck in SI units; other elements and materials beyond two are not read."""
-    deck = read_keyword(path)
-    if not deck.solids:
+    """Hexahedra of a keyword deck; SI units unless its numbers fit one other system alone."""
+    ours = model_of_own_deck(read_keyword(path))
+    if ours is not None:
+        return _of_model(ours)
+    source = open_deck([path], otherwise="m-kg-s")
+    mesh, deck = source.helmet, source.deck
+    if not len(mesh.solids):
         raise InputError(path, "holds no *ELEMENT_SOLID", expected="hexahedra")
-    ids = np.array(sorted({n for _, corners in deck.solids.values() for n in corners}), np.int64)
-    lost = [n for n in ids.tolist() if n not in deck.nodes]
-    if lost:
-        raise InputError(path, f"node {lost[0]} is in an element and not under *NODE", mend="add the node")
-    wrong = [e for e, (_, corners) in deck.solids.items() if len(set(corners)) != 8]
-    if wrong:
+    kinds = element_kinds(mesh.solids)
+    if kinds.any():
+        row = int(np.argmax(kinds != 0))
         raise InputError(
-            path, f"element {wrong[0]} has fewer than eight nodes of its own", expected="hexahedra alone",
-            mend="mesh that part with hexahedra",
+            path, f"element {mesh.solid_ids[row]} is a {KINDS[kinds[row]]}; {int((kinds != 0).sum())} are no hexahedra",
+            line=int(deck.solids.lines[row]), expected="hexahedra alone",
+            mend="mesh that part with hexahedra, or let `replay helmet prepare` take wedges out",
         )  # fmt: skip
-    pids = sorted({pid for pid, _ in deck.solids.values()})
-    index = {pid: k for k, pid in enumerate(pids)}
+    used = np.unique(mesh.solids[:, :8])
+    row_of = np.full(len(mesh.nodes), -1)
+    row_of[used] = np.arange(len(used))
+    kept = [k for k in range(len(mesh.parts)) if (mesh.solid_part == k).any()]
     parts, unknown = [], {}
-    for pid in pids:
-        if pid not in deck.parts:
-            raise InputError(path, f"part {pid} has elements and no *PART", mend="add the part")
-        name, _, mid = deck.parts[pid]
-        keyword, values = deck.materials.get(mid, (f"no *MAT with number {mid}", (1.0,)))
-        if keyword in _KEYWORD_LAWS:
-            law, names = _KEYWORD_LAWS[keyword]
-            material = Material(f"{keyword} {mid}", law, values[0], dict(zip(names, values[1:])))
+    for part in (mesh.parts[k] for k in kept):
+        mid = deck.of_kind("part")[part.pid].whole("mid") if part.has_material else 0
+        mapped = source.materials.get(mid)
+        if mapped is None or mapped.refused:
+            unknown[part.pid] = mapped.keyword if mapped else "no material"
+            density = mapped.density_kg_per_m3 if mapped and mapped.density_kg_per_m3 > 0 else 1.0
+            material = Material(f"part {part.pid}", "rigid", density, {})
         else:
-            unknown[pid] = keyword
-            material = Material(f"{keyword} {mid}", "rigid", values[0], {})
-        parts.append(SolverPart(pid, name or f"part {pid}", material))
+            material = Material(f"{mapped.keyword} {mid}", mapped.law, mapped.density_kg_per_m3, mapped.parameters)
+        parts.append(SolverPart(part.pid, part.name, material))
     return SolverModel(
-        nodes=np.array([deck.nodes[n] for n in ids.tolist()]),
-        node_ids=ids,
-        hexes=np.searchsorted(ids, np.array([corners for _, corners in deck.solids.values()])),
-        element_ids=np.array(list(deck.solids), np.int64),
-        element_part=np.array([index[pid] for pid, _ in deck.solids.values()], np.int64),
+        nodes=mesh.nodes[used],
+        node_ids=mesh.node_ids[used],
+        hexes=row_of[mesh.solids[:, :8]],
+        element_ids=mesh.solid_ids,
+        element_part=np.searchsorted(kept, mesh.solid_part),
         parts=tuple(parts),
-        part_sets=dict(deck.part_sets.values()),
+        part_sets={e.title or str(number): e.members() for number, e in deck.of_kind("part_set").items()},
+        node_sets={n: row_of[r][row_of[r] >= 0] for n, r in mesh.node_sets.items() if (row_of[r] >= 0).any()},
         unknown=unknown,
     )
 

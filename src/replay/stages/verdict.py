@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from replay.bundle import package_facts
 from replay.files import write_json
@@ -36,6 +38,12 @@ def limits_of(stage: Stage) -> Limits:
         "helmet.cg_offset_m": play.helmet.cg_tolerance_m,
     }
     return Limits.load({**tolerances, **play.gates})
+
+
+def told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:
+    """Entries that a gate's checks name, with their details; a detail that says nothing is left out."""
+    named = {name: facts[name] for name in checks}
+    return named | {f"{name}_detail": facts[f"{name}_detail"] for name in checks if facts.get(f"{name}_detail")}
 
 
 def collect(stage: Stage) -> list[Gate]:

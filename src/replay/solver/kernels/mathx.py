@@ -1,4 +1,4 @@
-"""Exponential, logarithm and angle in plain arithmetic: branch-free, vectorisable, the same on every machine.
+"""Exponential, logarithm and their kin in plain arithmetic: branch-free, vectorisable, the same on every machine.
 
 A call of the C library inside the lane loop would stop LLVM from vectorising it and would
 give other bits with another library. All functions stay within 2 units in the last place
@@ -35,32 +35,48 @@ def select(condition, yes, no):
 
 
 @device
-def exp(x):
-    """Exponential; the argument is held within [-708, 709].
+def _reduced_exponential(x):
+    """``exp(r) - 1`` and 2^k in two factors, so that their product with it stays normal to the end of the range.
 
     x = k ln 2 + r with |r| <= ln 2 / 2, and exp(r) by its Taylor series to r^13 (remainder 4e-18).
     """
-    x = min(max(x, -708.0), 709.0)
     shifted = x * _LOG2_E + _ROUND
     k = shifted - _ROUND
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
-    tail = 1.0 / 479001600.0 + r * (1.0 / 6227020800.0)
-    tail = 1.0 / 39916800.0 + r * tail
-    tail = 1.0 / 3628800.0 + r * tail
-    tail = 1.0 / 362880.0 + r * tail
-    tail = 1.0 / 40320.0 + r * tail
-    tail = 1.0 / 5040.0 + r * tail
-    tail = 1.0 / 720.0 + r * tail
-    tail = 1.0 / 120.0 + r * tail
-    tail = 1.0 / 24.0 + r * tail
-    tail = 1.0 / 6.0 + r * tail
-    series = 1.0 + (r + r * r * (0.5 + r * tail))
-    # 2^k in two factors, so that the product stays normal to the end of the range
+    r2 = r * r
+    r4 = r2 * r2
+    # in pairs rather than one term after the other: a third of the waiting
+    low = (1.0 / 2.0 + r * (1.0 / 6.0)) + r2 * (1.0 / 24.0 + r * (1.0 / 120.0))
+    middle = (1.0 / 720.0 + r * (1.0 / 5040.0)) + r2 * (1.0 / 40320.0 + r * (1.0 / 362880.0))
+    high = (1.0 / 3628800.0 + r * (1.0 / 39916800.0)) + r2 * (1.0 / 479001600.0 + r * (1.0 / 6227020800.0))
     bits = np.float64(shifted).view(np.int64) - _ROUND_BITS
     half = bits >> 1
     first = np.int64((half + _EXPONENT_BIAS) << 52).view(np.float64)
     second = np.int64((bits - half + _EXPONENT_BIAS) << 52).view(np.float64)
-    return series * first * second
+    return r + r2 * (low + r4 * (middle + r4 * high)), first, second
+
+
+@device
+def exp(x):
+    """Exponential; the argument is held within [-708, 709]."""
+    less_one, first, second = _reduced_exponential(min(max(x, -708.0), 709.0))
+    return (1.0 + less_one) * first * second
+
+
+@device
+def expm1(x):
+    """``exp(x) - 1``, right near zero too; the argument is held within [-708, 708]."""
+    less_one, first, second = _reduced_exponential(min(max(x, -708.0), 708.0))
+    power = first * second
+    return power * less_one + (power - 1.0)
+
+
+@device
+def sinh(x):
+    """Hyperbolic sine, right near zero too; the argument is held within [-708, 708]."""
+    t = expm1(abs(x))
+    half = 0.5 * (t + t / (1.0 + t))
+    return select(x < 0.0, -half, half)
 
 
 @device
@@ -78,15 +94,11 @@ def log(x):
     d = m - 1.0
     f = d / (m + 1.0)
     s = f * f
-    series = 1.0 / 19.0 + s * (1.0 / 21.0)
-    series = 1.0 / 17.0 + s * series
-    series = 1.0 / 15.0 + s * series
-    series = 1.0 / 13.0 + s * series
-    series = 1.0 / 11.0 + s * series
-    series = 1.0 / 9.0 + s * series
-    series = 1.0 / 7.0 + s * series
-    series = 1.0 / 5.0 + s * series
-    series = 1.0 / 3.0 + s * series
+    s2 = s * s
+    s4 = s2 * s2
+    low = (1.0 / 3.0 + s * (1.0 / 5.0)) + s2 * (1.0 / 7.0 + s * (1.0 / 9.0))
+    high = (1.0 / 11.0 + s * (1.0 / 13.0)) + s2 * (1.0 / 15.0 + s * (1.0 / 17.0))
+    series = low + s4 * (high + s4 * (1.0 / 19.0 + s * (1.0 / 21.0)))
     # log(1 + d) = d - d^2/2 + f (d^2/2 + 2 s series)
     h = 0.5 * d * d
     return count * _LN2_HIGH + (d - (h - (f * (h + 2.0 * s * series) + count * _LN2_LOW)))
@@ -113,3 +125,10 @@ def angle(sine, cosine):
     series = 1.0 / 5.0 + s * series
     series = -1.0 / 3.0 + s * series
     return 8.0 * (x + x * s * series)
+
+
+@device
+def log1p(x):
+    """``log(1 + x)`` for x > -1: the logarithm of the rounded sum, and what the rounding lost."""
+    u = 1.0 + x
+    return log(u) + (x - (u - 1.0)) / u

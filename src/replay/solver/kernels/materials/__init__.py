@@ -8,7 +8,10 @@ A law is a module with
     Frozen dataclass, units in the field names; ``constants()`` gives the numbers of the kernel.
     It raises ``ValueError`` with a sentence for values that make no sense.
 ``STATE``
-    Names of the state variables kept per element besides the stress; all start at zero.
+    Names of the state variables kept per element besides the stress. They start at zero, or at the values of
+    ``Parameters.initial_state()`` where the law has that method.
+``FIELDS``
+    Optional: state variables that outputs show, by the name they have there.
 ``TOTAL_FORM``
     Whether the law looks at the deformation gradient.
 ``INITIAL_STRESS``

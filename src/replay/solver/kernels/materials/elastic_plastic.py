@@ -28,6 +28,7 @@ from replay.solver.kernels.tensors import add_scaled_sym, contract, deviator
 
 NAME = "elastic_plastic"
 STATE: tuple[str, ...] = ("equivalent_plastic_strain", "plastic_work_j_per_m3")
+FIELDS = {"equivalent_plastic_strain": "equivalent_plastic_strain"}
 INITIAL_STRESS = True
 TOTAL_FORM = False
 HOURGLASS_YIELDS = True

@@ -1,0 +1,249 @@
+"""Protocol mode beside posterior mode: the columns, rows and words in which both are handed over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from replay.motion.bands import CURVES, NOT_RESOLVABLE, QUANTITIES, UNITS, Band, band, constants
+from replay.motion.kinematics import KINEMATICS
+from replay.motion.posterior import PosteriorMotion
+from replay.motion.settings import CameraSettings
+from replay.motion.tracks import Template, Tracks
+from replay.tables import Column, TableFormat
+
+DECIDED_FLIP = 3.0
+"""Log odds from which the path is told from its mirrored twin: twenty to one."""
+_CURVE_UNITS = {"omega": "rad_per_s", "alpha": "rad_per_s2", "a": "m_per_s2"}
+_CURVE_WORDS = {"omega": "angular velocity", "alpha": "angular acceleration", "a": "CG acceleration"}
+
+
+def _names(curve: str) -> list[tuple[str, str]]:
+    """Stem of each column of a curve, and what it is."""
+    unit, words = _CURVE_UNITS[curve], _CURVE_WORDS[curve]
+    joint = "" if curve == "a" else "_"
+    return [
+        *((f"{curve}{joint}{axis}_{unit}", f"{axis} of the {words}") for axis in "xyz"),
+        (f"{curve}_{unit}", f"resultant {words}"),
+    ]
+
+
+KINEMATICS_BOTH = TableFormat(
+    "kinematics of the skull CG, both modes",
+    (
+        *KINEMATICS.columns,
+        *(
+            Column(f"posterior_{stem}{end}", f"{words}, posterior mode, global{kind}", may_be_empty=True)
+            for curve in CURVES
+            for stem, words in _names(curve)
+            for end, kind in (
+                ("", ""),
+                ("_lo", ": lower end of its 95 % band"),
+                ("_hi", ": upper end of its 95 % band"),
+            )
+        ),
+    ),
+)
+"""Format of ``kinematics.csv`` where the motion comes from clicks: protocol mode first."""
+
+PEAKS = TableFormat(
+    "peaks, both modes",
+    (
+        Column("quantity", "what peaks; SI, the unit is part of the name", kind="text"),
+        Column("protocol", "protocol mode: greatest sample", may_be_empty=True),
+        Column("protocol_null", "protocol mode on a head at rest under the same noise", may_be_empty=True),
+        Column("posterior", "posterior mode: between the frames; empty where not resolvable", may_be_empty=True),
+        Column("posterior_lo", "lower end of its 95 % band", may_be_empty=True),
+        Column("posterior_hi", "upper end of its 95 % band", may_be_empty=True),
+        Column("resolved", f"yes, or `{NOT_RESOLVABLE}`", kind="text"),
+    ),
+)
+"""Format of ``peaks.csv``."""
+
+CLICK_WEIGHTS = TableFormat(
+    "weights of the clicks",
+    (
+        Column("frame", "frame of the video", kind="int"),
+        Column("landmark_id", "landmark of the template", kind="text"),
+        Column("weight", "weight in the batch estimate: about 1, near 0 for a click that nothing else supports"),
+        Column("error_u_px", "click less projection, right [px]"),
+        Column("error_v_px", "click less projection, down [px]"),
+    ),
+)
+"""Format of ``click_weights.csv``."""
+
+
+@dataclass(frozen=True)
+class PosteriorQuality:
+    """What posterior mode reports, as ``quality.json`` holds it.
+
+    Parameters
+    ----------
+    bands
+        By quantity: value, low, high, resolved.
+    band_class
+        ``calibrated`` where the bands were made to cover on footage like this, else why not.
+    flip_margin
+        Log odds of the path against its mirrored twin; infinite where there is none.
+    event_probability, null_peak_rad_per_s, click_sigma_px
+        Of `replay.motion.posterior.PosteriorMotion`; click noise as estimated.
+    """
+
+    bands: dict[str, Band]
+    band_class: str
+    flip_margin: float
+    event_probability: float
+    null_peak_rad_per_s: float
+    click_sigma_px: float
+
+    @property
+    def peak_over_null(self) -> float:
+        """Peak angular velocity over the null peak."""
+        return self.bands["omega_rad_per_s"].value / max(self.null_peak_rad_per_s, 1e-9)
+
+    def document(self) -> dict[str, Any]:
+        """For ``quality.json``."""
+        return {
+            "bands": {
+                name: {"value": b.value, "low": b.low, "high": b.high} if b.resolved else NOT_RESOLVABLE
+                for name, b in self.bands.items()
+            },
+            "band_class": self.band_class,
+            "flip_margin": self.flip_margin if np.isfinite(self.flip_margin) else "no second path",
+            "event_probability": self.event_probability,
+            "null_peak_rad_per_s": self.null_peak_rad_per_s,
+            "click_sigma_px": self.click_sigma_px,
+        }
+
+    def gate_values(self) -> dict[str, float | bool | str]:
+        """Posterior mode's part of the reconstruction gate."""
+        omega = self.bands["omega_rad_per_s"]
+        return {
+            "posterior_flip_margin": (
+                self.flip_margin if np.isfinite(self.flip_margin) else "no mirrored twin of the path fits the clicks"
+            ),
+            "posterior_peak_over_null": self.peak_over_null,
+            "bands_calibrated": self.band_class == "calibrated",
+            "bands_calibrated_detail": f"band coverage class: {self.band_class}",
+            "peak_omega_resolved": omega.resolved,
+            "peak_omega_resolved_detail": f"peak angular velocity {omega.text()} rad/s"
+            if omega.resolved
+            else f"peak angular velocity is {NOT_RESOLVABLE}",
+        }
+
+
+def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: CameraSettings) -> PosteriorQuality:
+    """Bands of every quantity, and whether they are to be trusted."""
+    batch = posterior.batch
+    scale = float(np.median(np.exp(batch.state.log_f - batch.state.shift[:, 2])))
+    facts = {
+        "fps": camera.fps,
+        "landmarks": float(np.median(tracks.seen.sum(axis=1))),
+        "px_per_m": scale,
+        "sigma_px": batch.sigma_px,
+    }
+    outside = [
+        f"{name} {value:.3g} lies outside {low:g} to {high:g}"
+        for name, value in facts.items()
+        for low, high in [constants().calibrated[name]]
+        if not 0.95 * low <= value <= 1.05 * high
+    ]
+    if posterior.flip_margin < DECIDED_FLIP:
+        outside.append("the clicks do not tell the path from its mirrored twin")
+    return PosteriorQuality(
+        bands={name: band(name, values) for name, values in posterior.peaks.items()},
+        band_class="calibrated" if not outside else "extrapolated: " + "; ".join(outside),
+        flip_margin=posterior.flip_margin,
+        event_probability=posterior.event_probability,
+        null_peak_rad_per_s=posterior.null_peak_rad_per_s,
+        click_sigma_px=batch.sigma_px,
+    )
+
+
+def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:
+    """Posterior columns of `KINEMATICS_BOTH`; empty for frames beyond the window that was read."""
+    index, at = posterior.at_frames
+    out: dict[str, np.ndarray] = {}
+    draws = posterior.draws
+    for curve, values in (
+        ("omega", draws.omega_rad_per_s[:, at]),
+        ("alpha", draws.alpha_rad_per_s2[:, at]),
+        ("a", draws.acceleration_m_per_s2[:, at]),
+    ):
+        factor = constants().curves[curve]
+        columns = [*(values[..., i] for i in range(3)), np.linalg.norm(values, axis=2)]
+        for (stem, _), column in zip(_names(curve), columns):
+            mean, sigma = column.mean(axis=0), column.std(axis=0)
+            low = mean - factor * sigma
+            if stem == _names(curve)[-1][0]:
+                low = np.maximum(low, 0.0)
+            for end, part in (("", mean), ("_lo", low), ("_hi", mean + factor * sigma)):
+                full = np.full(frames, np.nan)
+                full[index] = part
+                out[f"posterior_{stem}{end}"] = full
+    return out
+
+
+def spin_band(posterior: PosteriorMotion, at: int) -> tuple[float, float]:
+    """95 % band of the angular velocity's magnitude at a point of the grid [rad/s]."""
+    spin = np.linalg.norm(posterior.draws.omega_rad_per_s[:, at], axis=1)
+    half = constants().curves["omega"] * float(spin.std())
+    return max(float(spin.mean()) - half, 0.0), float(spin.mean()) + half
+
+
+def peak_rows(quality: PosteriorQuality, protocol: dict[str, float], null: dict[str, float]) -> dict[str, list[Any]]:
+    """Columns of `PEAKS`."""
+    bands = [quality.bands[name] for name in QUANTITIES]
+
+    def told(values: list[float]) -> list[float]:
+        return [value if b.resolved else float("nan") for value, b in zip(values, bands)]
+
+    return {
+        "quantity": list(QUANTITIES),
+        "protocol": [protocol.get(name, float("nan")) for name in QUANTITIES],
+        "protocol_null": [null.get(name, float("nan")) for name in QUANTITIES],
+        "posterior": told([b.value for b in bands]),
+        "posterior_lo": told([b.low for b in bands]),
+        "posterior_hi": told([b.high for b in bands]),
+        "resolved": ["yes" if b.resolved else NOT_RESOLVABLE for b in bands],
+    }
+
+
+def click_weights(posterior: PosteriorMotion, tracks: Tracks, template: Template) -> dict[str, Any]:
+    """Columns of `CLICK_WEIGHTS`."""
+    rows, columns = np.nonzero(tracks.seen)
+    errors = posterior.batch.errors_px[rows, columns]
+    return {
+        "frame": tracks.frames[rows],
+        "landmark_id": [template.names[i] for i in columns],
+        "weight": posterior.batch.weights[rows, columns],
+        "error_u_px": errors[:, 0],
+        "error_v_px": errors[:, 1],
+    }
+
+
+def advice(quality: PosteriorQuality, tracks: Tracks, camera: CameraSettings, scale_px_per_m: float) -> list[str]:
+    """Lines for a reader: what this footage resolves, what it does not, and what would mend it."""
+    resolved = [UNITS[name][0].strip() for name in QUANTITIES if quality.bands[name].resolved]
+    missing = [UNITS[name][0].strip() for name in QUANTITIES if not quality.bands[name].resolved]
+    lines = ["Resolved:     " + (", ".join(resolved) or "nothing"), "Not resolved: " + (", ".join(missing) or "-")]
+    mend = []
+    landmarks = int(np.median(tracks.seen.sum(axis=1)))
+    accelerations = any(not quality.bands[name].resolved for name in ("alpha_rad_per_s2", "a_across_m_per_s2"))
+    if camera.fps < 115.0 and accelerations:
+        mend.append(f"frame rate: at {camera.fps:g} fps a pulse of 10 ms falls between frames; 240 fps would show it")
+    if landmarks < 6:
+        mend.append(f"landmarks: {landmarks} a frame are clicked; 6 that do not lie in one plane would settle the pose")
+    if scale_px_per_m < 300.0 and missing:
+        mend.append(f"closeness: {scale_px_per_m:.0f} px/m; twice the zoom halves every angular band")
+    if quality.click_sigma_px > 1.5 and missing:
+        mend.append(
+            f"clicks: {quality.click_sigma_px:.2g} px of noise; a second click of each landmark, or tracking, helps"
+        )
+    if quality.flip_margin < DECIDED_FLIP:
+        mend.append("the pose and its mirror image fit alike: click a landmark out of the plane of the others")
+    if not quality.bands["a_along_m_per_s2"].resolved:
+        mend.append("along the line of sight: a second camera; depth comes from the size of the helmet in the picture")
+    return lines + ["What would help:"] * bool(mend) + [f"  - {line}" for line in mend]

@@ -1,0 +1,69 @@
+"""The shipped bands cover on motions that had no part in making them, and would not if they were half as wide."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from replay.motion.bands import CONSTANTS_FILE, QUANTITIES, RATIOS, band, constants
+from replay.motion.families import BUILDING, TESTING, draw
+from replay.motion.readout import ANGULAR, read_out
+
+CLIPS = 30
+SIGMA_RAD = np.array([0.011, 0.025, 0.026])
+"""What six landmarks tell of an orientation at 300 px/m and 1 px, by axis."""
+
+
+@pytest.fixture(scope="module")
+def told():
+    """Band of the peak angular velocity and the truth, of orientations observed at 59.94 fps."""
+    out = []
+    for seed in range(CLIPS):
+        rng = np.random.default_rng([23, seed])
+        time = (np.arange(-12, 13) + rng.random()) / 59.94
+        truth = draw(TESTING[seed % 2], rng, (time[0], time[-1]), np.zeros(3))
+        rotation = truth.at(time).rotation
+        turns = (rotation[:-1].inv() * rotation[1:]).as_rotvec()
+        axes = Rotation.random(random_state=seed).as_matrix()
+        level = np.concatenate([np.zeros((1, 3)), np.cumsum(turns, axis=0)])
+        level += (SIGMA_RAD * rng.standard_normal((len(time), 3))) @ axes.T
+        information = np.tile(axes @ np.diag(SIGMA_RAD**-2) @ axes.T, (len(time), 1, 1))
+        drawn = read_out(time - time[0], level, information, ANGULAR, np.random.default_rng(seed), draws=200)
+        steps = (len(drawn.time_s) - 1) // (len(time) - 1)
+        peaks = np.linalg.norm(drawn.rate, axis=2)[:, steps:-steps].max(axis=1)
+        fine = truth.at(np.linspace(time[1], time[-2], 1000))
+        out.append((band("omega_rad_per_s", peaks), float(fine.omega_resultant.max())))
+    return out
+
+
+def covered(told, share):
+    inside = 0
+    for found, truth in told:
+        low, high = (found.value * (end / found.value) ** share for end in (found.low, found.high))
+        inside += low <= truth <= high
+    return inside / len(told)
+
+
+def test_bands_cover_on_other_families(told):
+    assert covered(told, 1.0) >= 0.85
+
+
+def test_bands_of_half_the_width_would_not(told):
+    assert covered(told, 0.5) < 0.85
+
+
+def test_the_peak_is_read_as_well_as_the_table_says(told):
+    error = [abs(found.value / truth - 1.0) for found, truth in told]
+    assert np.median(error) < 0.12
+
+
+def test_families_that_build_do_not_test():
+    assert not set(BUILDING) & set(TESTING)
+    assert f"families: [{', '.join(BUILDING)}]" in CONSTANTS_FILE.read_text()
+
+
+def test_every_quantity_has_constants():
+    assert set(constants().peaks) == set(QUANTITIES)
+    for name in RATIOS:
+        calibration = constants().peaks[name]
+        assert sorted(calibration.widths) == list(calibration.widths)
+        assert min(calibration.reach) > 0.0
