@@ -298,7 +298,7 @@ def material_lines(part: DeckPart) -> list[str]:
         head = field_names("mid", "ro", "bulk", "g0", "gi", "beta")
         note = f"$ {part.name}: stands for the law brain_isv, linearised at rest; no damage"
         values = (p["bulk_modulus_pa"], short + network, network, short * flow)
-        return [note, "*MAT_VISCOELASTIC", head, card(mid, density, *values)]
+        return ["*MAT_VISCOELASTIC", note, head, card(mid, density, *values)]
     if part.law == "crushable_foam":
         strain, stress = foam_curve(p)
         tension = float(p.get("tension_cutoff_pa", p["plateau_stress_pa"]))
