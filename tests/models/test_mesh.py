@@ -9,20 +9,21 @@ from replay.models import Model, build_model
 from replay.models.cubed_sphere import cube_lattice
 from replay.models.guard import relocate_worst_nodes
 from replay.models.head_shape import preset_names
-from replay.models.ogrid import RESOLUTIONS, Resolution, head_mesh
+from replay.models.ogrid import Resolution, head_mesh
 from replay.models.preview import outer_faces
 from replay.models.quality import FACES, aspect_ratios, characteristic_lengths, hex_volumes, scaled_jacobians
 from replay.models.radial import Ellipsoid, RadialSurfaces
 
 FLOORS = {
     # least scaled Jacobian, 1 %, mean, largest aspect ratio
-    "tiny": (0.35, 0.58, 0.87, 9.6),
-    "coarse": (0.35, 0.60, 0.89, 9.6),
+    "tiny": (0.45, 0.60, 0.88, 9.6),
+    "coarse": (0.40, 0.65, 0.90, 9.0),
+    "medium": (0.35, 0.65, 0.90, 9.0),
 }
 
 
 @pytest.mark.parametrize("preset", preset_names())
-@pytest.mark.parametrize("resolution", list(RESOLUTIONS))
+@pytest.mark.parametrize("resolution", list(FLOORS))
 def test_quality_is_above_its_floor_in_every_preset(preset: str, resolution: str) -> None:
     model = build_model(preset, resolution)
     quality = scaled_jacobians(model.nodes, model.hexes)
