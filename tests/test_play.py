@@ -123,7 +123,7 @@ def test_the_range_of_the_helmet_includes_its_ends(demo, mass):
         ("name: demo", "name: other", "the folder is called 'demo'"),
         ("kind: clicks", "kind: click", "did you mean `clicks`?"),
         ("kind: clicks   ", "knd: clicks   ", "`kind`"),
-        ("resolution: coarse", "resolution: fine", "'tiny' or 'coarse'"),
+        ("resolution: coarse", "resolution: finest", "'tiny', 'coarse', 'medium' or 'fine'"),
     ],
 )
 def test_a_mistake_is_named_with_what_was_expected(demo, old, new, expected):

@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
             command.add_argument(
                 "--resolution",
                 default="as-the-play-says",
-                choices=["as-the-play-says", "tiny", "coarse"],
+                choices=["as-the-play-says", "tiny", "coarse", "medium", "fine"],
                 help="override model.resolution of the play",
             )
         if name not in _ALWAYS_RUN:
@@ -124,7 +124,7 @@ def _parser() -> argparse.ArgumentParser:
 
     model = commands.add_parser("model", help="build a head and helmet model by itself")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
-    model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse"])
+    model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse", "medium", "fine"])
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
 

@@ -334,7 +334,7 @@ class ModelChoice(Setting):
     """The finite-element model."""
 
     preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
-    resolution: Literal["tiny", "coarse"] = Field(default="coarse", description="Mesh resolution.")
+    resolution: Literal["tiny", "coarse", "medium", "fine"] = Field(default="coarse", description="Mesh resolution.")
     brain_material: Literal["brain_isv", "viscohyperelastic"] = Field(
         default="brain_isv",
         description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
@@ -398,7 +398,9 @@ class Contact(Setting):
         default=(
             FrictionPair(first="scalp", second="H1_pads_set1", friction=0.5),
             FrictionPair(first="scalp", second="H1_pads_set2", friction=0.5),
-            FrictionPair(first="scalp", second="chin_cup", friction=0.5),
+            FrictionPair(first="face", second="H1_pads_set1", friction=0.5),
+            FrictionPair(first="face", second="H1_pads_set2", friction=0.5),
+            FrictionPair(first="face", second="chin_cup", friction=0.5),
         ),
         description="Friction by pair; a later one wins. Pads and chin cup on skin as in protocol 3.2.",
     )

@@ -8,20 +8,22 @@ import pytest
 from replay.models import Model, build_model
 from replay.models.cubed_sphere import cube_lattice
 from replay.models.guard import relocate_worst_nodes
-from replay.models.head_shape import head_preset, preset_names
-from replay.models.ogrid import RESOLUTIONS, Resolution, head_mesh
+from replay.models.head_shape import preset_names
+from replay.models.ogrid import Resolution, head_mesh
 from replay.models.preview import outer_faces
 from replay.models.quality import FACES, aspect_ratios, characteristic_lengths, hex_volumes, scaled_jacobians
+from replay.models.radial import Ellipsoid, RadialSurfaces
 
 FLOORS = {
     # least scaled Jacobian, 1 %, mean, largest aspect ratio
-    "tiny": (0.55, 0.58, 0.88, 9.6),
-    "coarse": (0.60, 0.65, 0.91, 8.0),
+    "tiny": (0.45, 0.60, 0.88, 9.6),
+    "coarse": (0.40, 0.65, 0.90, 9.0),
+    "medium": (0.35, 0.65, 0.90, 9.0),
 }
 
 
 @pytest.mark.parametrize("preset", preset_names())
-@pytest.mark.parametrize("resolution", list(RESOLUTIONS))
+@pytest.mark.parametrize("resolution", list(FLOORS))
 def test_quality_is_above_its_floor_in_every_preset(preset: str, resolution: str) -> None:
     model = build_model(preset, resolution)
     quality = scaled_jacobians(model.nodes, model.hexes)
@@ -98,14 +100,14 @@ def test_the_mid_sagittal_plane_cuts_no_head_element(model: Model) -> None:
 
 
 def test_volume_of_layers_converges_with_second_order() -> None:
-    preset = head_preset("nfl")
-    brain, csf = 0.0820 * 0.0610 * 0.0568, 0.0865 * 0.0654 * 0.0613
-    exact = 4 / 3 * np.pi * np.array([brain, csf - brain])
+    shapes = [Ellipsoid((a, b, c)) for a, b, c in ((0.082, 0.061, 0.057), (0.087, 0.065, 0.061), (0.10, 0.08, 0.07))]
+    surfaces = RadialSurfaces(*shapes, Ellipsoid((0.11, 0.09, 0.08)), (0, 0, 0), (0, 0, 0), 1.0, 0.0)
+    exact = np.array([shapes[0].volume_m3, shapes[1].volume_m3 - shapes[0].volume_m3])
     errors = []
     for divisions in (6, 12, 24):
         lattice = cube_lattice(divisions)
         setting = Resolution(divisions, 2, 1, 1, 1, 1, 1, 0.02)
-        mesh = head_mesh(lattice, preset.surfaces, setting, lattice.directions, preset.least_thickness_m)
+        mesh = head_mesh(lattice, surfaces, setting, lattice.directions, {"csf": 0.0, "skull": 0.0, "scalp": 0.0})
         volume = np.bincount(mesh.tissue, weights=hex_volumes(mesh.nodes, mesh.hexes))[:2]
         errors.append(np.abs(volume - exact) / exact)
     rates = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))

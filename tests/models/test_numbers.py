@@ -68,7 +68,7 @@ def test_mass_of_a_block_is_exact_wherever_it_stands() -> None:
 def test_inertia_of_a_meshed_ball_converges_to_two_fifths() -> None:
     ball = Ellipsoid((0.05, 0.05, 0.05))
     outside = [Ellipsoid((r, r, r)) for r in (0.06, 0.07, 0.08)]
-    surfaces = RadialSurfaces(ball, *outside, (0, 0, 0), (0, 0, 0), (1, 1, 1))
+    surfaces = RadialSurfaces(ball, *outside, (0, 0, 0), (0, 0, 0), 1.0, 0.0)
     errors = []
     for n in (6, 12):
         lattice = cube_lattice(n)
@@ -99,33 +99,40 @@ def test_head_and_helmet_have_their_stated_mass_and_the_origin_is_the_heads_cg(m
     assert head.mass_kg == pytest.approx(4.90, rel=1e-12)
     assert helmet.mass_kg == pytest.approx(1.83, rel=1e-12)
     np.testing.assert_allclose(head.cg_m, 0, atol=0.51e-9)  # nodes lie on a grid of a nanometre
-    for name, mass in (("brain", 1.19), ("csf", 0.27), ("skull", 1.28), ("scalp", 2.16)):
-        assert assembly_mass(model, name=name).mass_kg == pytest.approx(mass, rel=1e-12)
+    for name in ("grey_matter", "white_matter", "csf"):
+        assert model.info["calibration"][name]["density_factor"] == 1.0
 
 
-@pytest.mark.parametrize(("preset", "head", "helmet"), [("anat", 4.37, 1.73), ("article", 5.80, 1.95)])
+@pytest.mark.parametrize(("preset", "head", "helmet"), [("anat", 4.42, 1.73), ("article", 5.80, 1.95)])
 def test_presets_have_their_masses(preset: str, head: float, helmet: float) -> None:
     model = build_model(preset, "tiny")
     assert assembly_mass(model, "head").mass_kg == pytest.approx(head)
     assert assembly_mass(model, "helmet").mass_kg == pytest.approx(helmet)
 
 
-def test_volumes_are_near_the_articles_and_densities_need_little_correction(coarse: Model) -> None:
-    table = parts_table(coarse)
+def test_the_article_preset_has_the_articles_volumes_and_masses() -> None:
+    model = build_model("article", "coarse", helmet=False)
+    table = parts_table(model)
     volume = dict(zip(table["name"], table["volume_m3"]))
-    assert volume["brain"] == pytest.approx(1.19e-3, rel=0.02)
-    assert volume["csf"] == pytest.approx(2.60e-4, rel=0.02)
-    assert volume["skull"] == pytest.approx(9.43e-4, rel=0.03)
-    for name, state in coarse.info["calibration"].items():
-        limit = 0.03 if name in ("brain", "csf", "skull", "scalp") else 0.13
-        assert abs(state["density_factor"] - 1) < limit, name
+    mass = {name: state["mass_after_kg"] for name, state in model.info["calibration"].items()}
+    brain, skin = ("grey_matter", "white_matter"), ("scalp", "face")
+    for names, litres, kilograms in ((brain, 1.19, 1.19), (("csf",), 0.26, 0.27), (("skull",), 0.943, 1.28)):
+        assert sum(volume[name] for name in names) * 1e3 == pytest.approx(litres, rel=0.03), names
+        assert sum(mass[name] for name in names) == pytest.approx(kilograms, rel=1e-12), names
+    assert sum(volume[name] for name in skin) * 1e3 == pytest.approx(2.53, rel=0.03)
+    assert sum(mass.values()) == pytest.approx(5.80, rel=1e-12)
 
 
-def test_inertia_is_that_of_a_head(coarse: Model) -> None:
-    """Average male 21.5, 23.3, 15.5e-3 kg m^2 at 4.42 kg, scaled by mass to the power 5/3: within 20 %."""
-    measured = np.diag(assembly_mass(coarse, "head").inertia_kg_m2)
-    expected = np.array([21.5, 23.3, 15.5]) * 1e-3 * (4.90 / 4.42) ** (5 / 3)
-    np.testing.assert_allclose(measured, expected, rtol=0.20)
+def test_the_average_head_has_its_centre_of_gravity_and_moments() -> None:
+    """Average male, 4.42 kg: 1.3 mm ahead of and 26.4 mm above the tragion; 21.5, 23.3, 15.5e-3 kg m^2."""
+    model = build_model("anat", "coarse", helmet=False)
+    assert np.abs(-np.array(model.info["tragion_m"]) - [0.0013, 0.0, 0.0264]).max() < 2e-3
+    for name in ("skull", "scalp", "face"):
+        assert abs(model.info["calibration"][name]["density_factor"] - 1) < 0.2, name
+    moments = np.diag(assembly_mass(model, "head").inertia_kg_m2) * 1e3
+    assert moments[0] == pytest.approx(21.5, rel=0.20)  # 17 % low: see docs/model.md
+    assert moments[1] == pytest.approx(23.3, rel=0.05)
+    assert moments[2] == pytest.approx(15.5, rel=0.12)
 
 
 def test_a_helmet_takes_the_mass_of_the_play_and_keeps_its_centre(tiny: Model) -> None:

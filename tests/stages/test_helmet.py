@@ -357,8 +357,9 @@ def test_an_edited_card_holds_against_the_facts(tmp_path: Path, model: Model) ->
     scalp = next(part for part in model.parts if part.role == "scalp")
     young = model.materials[scalp.material]["parameters"]["youngs_modulus_pa"]
     text = head.read_text()
-    assert text.count(card(float(young))) == 1
-    head.write_text(text.replace(card(float(young)), card(2.0 * young)))
+    assert text.count(card(float(young))) == 2, "scalp and face have one stiffness"
+    first = text.index(card(float(young)), text.index(str(scalp.pid)))
+    head.write_text(text[:first] + text[first:].replace(card(float(young)), card(2.0 * young), 1))
     back = read_deck_as_model([tmp_path / "main.k"])
     part = next(p for p in back.parts if p.role == "scalp")
     assert back.materials[part.material]["parameters"]["youngs_modulus_pa"] == pytest.approx(2 * young)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from replay.models.anatomy.labels import Tissue
+from replay.models.anatomy.surfaces import face_weight, load_anatomy
+from replay.models.calibration import calibrate_densities
 from replay.models.cubed_sphere import cube_lattice
 from replay.models.facemask import facemask_mesh
 from replay.models.guard import relocate_worst_nodes
@@ -13,13 +14,17 @@ from replay.models.head_shape import HeadPreset, head_preset, load_data
 from replay.models.helmet import helmet_mesh
 from replay.models.helmet_layout import PADS, helmet_layout
 from replay.models.mass import mass_properties
-from replay.models.materials import MATERIAL_OF_ROLE, load_materials
+from replay.models.materials import MATERIAL_OF_ROLE
 from replay.models.model import GRID_DECIMALS, Model, Part
-from replay.models.ogrid import RESOLUTIONS, TISSUES, head_mesh
-from replay.models.quality import hex_volumes
+from replay.models.ogrid import RESOLUTIONS, TISSUES, HeadMesh, head_mesh
+from replay.models.quality import shape_functions
 from replay.models.regions import REGION_NAMES, label_regions
 
-HEAD_PART_IDS = {"brain": 60000001, "csf": 60000002, "skull": 60000003, "scalp": 60009020}
+HEAD_PART_IDS = {
+    "grey_matter": 60000001, "csf": 60000002, "skull": 60000003, "white_matter": 60000004, "scalp": 60009020,
+    "face": 60009021,
+}  # fmt: skip
+HEAD_ROLES = {"grey_matter": "brain", "white_matter": "brain"}
 PID_BLOCKS = {"head": (60_000_000, 69_999_999), "helmet": (10_000_000, 19_999_999)}
 SET_IDS = {
     "H1_pads_set1": 10000099,
@@ -31,7 +36,9 @@ SET_IDS = {
 }
 NOTES = (
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
-    "head surfaces are analytic (ellipsoids), not a person's anatomy",
+    "brain and scalp are an average of many people's anatomy; the skull between them is a rule, not a measured bone",
+    "sulci and ventricles are meshed as grey matter: the fluid of the article is stiffer in shear than brain",
+    "falx and tentorium are left out",
 )
 SEAT_NOTES = {
     "shared_nodes": (
@@ -52,6 +59,10 @@ STRUCTURE_NOTES = {
     "deformable": "shell and facemask are elastic, one hex across: their bending is carried by hourglass stiffness",
 }
 _QUALITY_TARGET = 0.30
+#: Shape functions at 4 x 4 x 4 places of a hex, where the labels are asked.
+_SAMPLES = np.stack(
+    [shape_functions(np.array([u, v, w]) * 0.5 - 0.75) for u in range(4) for v in range(4) for w in range(4)]
+)
 
 
 def build_model(
@@ -102,7 +113,7 @@ def build_model(
     if resolution not in RESOLUTIONS:
         message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
         raise ValueError(message)
-    head = head_preset(preset)
+    head = head_preset(preset, RESOLUTIONS[resolution].divisions)
     target = head.helmet_mass_kg if helmet_mass_kg is None else float(helmet_mass_kg)
     if not target > 0:
         message = f"a helmet of {target} kg"
@@ -116,9 +127,10 @@ def build_model(
     order = np.argsort(element_part, kind="stable")
     hexes, element_part = hexes[order], element_part[order]
     regions = np.zeros(len(hexes), dtype=np.int32)
-    in_brain = element_part == index["brain"]
+    in_brain = np.array([part.role == "brain" for part in parts])[element_part]
     regions[in_brain] = label_regions(head.surfaces.to_atlas(nodes[hexes[in_brain]].mean(axis=1)))
-    materials, calibration = _calibrated(nodes, hexes, element_part, parts, head, target, brain)
+    calibration = calibrate_densities(nodes, hexes, element_part, parts, head, target, brain)
+    materials = calibration.materials
     if helmet_structure == "rigid":
         for part in parts:
             if part.role in STRUCTURE_ROLES:
@@ -149,9 +161,10 @@ def build_model(
             "star_centre_m": [float(v) for v in -cg],
             "tragion_m": [float(v) for v in np.array(head.surfaces.tragion_m) - cg],
             "atlas_centre_mm": list(head.surfaces.atlas_centre_mm),
-            "atlas_mm_per_m": list(head.surfaces.atlas_mm_per_m),
+            "atlas_mm_per_m": head.surfaces.atlas_mm_per_m,
+            "atlas_pitch_rad": head.surfaces.atlas_pitch_rad,
             "helmet_mass_target_kg": target if helmet else None,
-            "calibration": calibration,
+            "calibration": calibration.table,
             "guard_moved_nodes": int(moved),
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
             "helmet_structure": helmet_structure if helmet else None,
@@ -165,7 +178,10 @@ def build_model(
 def part_table() -> tuple[Part, ...]:
     """Every part the builder knows, with its number."""
     ids = load_data("helmet.yaml")["part_ids"]
-    parts = [Part(pid, name, name, "head", MATERIAL_OF_ROLE[name]) for name, pid in HEAD_PART_IDS.items()]
+    parts = []
+    for name, pid in HEAD_PART_IDS.items():
+        role = HEAD_ROLES.get(name, name)
+        parts.append(Part(pid, name, role, "head", MATERIAL_OF_ROLE[role]))
     for role in ("shell", "facemask"):
         parts.append(Part(ids[role], role, role, "helmet", MATERIAL_OF_ROLE[role]))
     for role in ("comfort_pad", "energy_pad"):
@@ -182,7 +198,7 @@ def _mesh(
     lattice = cube_lattice(setting.divisions)
     layout = helmet_layout(lattice, helmet)
     inner = head_mesh(lattice, head.surfaces, setting, layout.directions, head.least_thickness_m)
-    names = np.array(TISSUES)[inner.tissue].astype("U32")
+    names = head_part_names(inner, head)
     if seat is None:
         return inner.nodes, inner.hexes, names, {}, np.zeros(0, dtype=int)
     outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet, seat)
@@ -192,49 +208,20 @@ def _mesh(
     return mask.nodes, np.vstack([inner.hexes, outer.hexes, mask.hexes]), names, mask.mounts, cup
 
 
-def _calibrated(
-    nodes: np.ndarray,
-    hexes: np.ndarray,
-    element_part: np.ndarray,
-    parts: tuple[Part, ...],
-    head: HeadPreset,
-    helmet_mass_kg: float,
-    brain: str,
-) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, float]]]:
-    """Densities that give every head part its mass and the helmet its own; the state before and after.
-
-    Each tissue is scaled to its own mass (what faceting and the ellipsoids' fit lack); the helmet's parts by one
-    factor, which leaves its centre of gravity where the nominal densities put it and stands for the hardware, straps
-    and paint that are not meshed.
-    """
-    volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
-    library = load_materials(brain)
-    nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
-    before = volume * nominal
-    of_helmet = np.array([p.assembly == "helmet" for p in parts])
-    factor = np.ones(len(parts))
-    for k, part in enumerate(parts):
-        if part.assembly == "head":
-            factor[k] = head.part_mass_kg[part.role] / before[k]
-    if of_helmet.any():
-        factor[of_helmet] = helmet_mass_kg / before[of_helmet].sum()
-    materials: dict[str, dict[str, Any]] = {}
-    for k, part in enumerate(parts):
-        material = dict(library[part.material])
-        material["density_nominal_kg_per_m3"] = float(nominal[k])
-        material["density_kg_per_m3"] = float(nominal[k] * factor[k])
-        material["certainty"] = {**material["certainty"], "density_kg_per_m3": "calibrated"}
-        materials.setdefault(part.material, material)
-    calibration = {
-        part.name: {
-            "volume_m3": float(volume[k]),
-            "mass_before_kg": float(before[k]),
-            "density_factor": float(factor[k]),
-            "mass_after_kg": float(before[k] * factor[k]),
-        }
-        for k, part in enumerate(parts)
-    }
-    return materials, calibration
+def head_part_names(mesh: HeadMesh, head: HeadPreset) -> np.ndarray:
+    """Part of every hex of a head, (m,): tissues by layer, brain by the label volume, scalp by direction."""
+    names = np.array(TISSUES)[mesh.tissue].astype("U32")
+    corners = mesh.nodes[mesh.hexes]
+    soft = names == "scalp"
+    centre = corners[soft].mean(axis=1)
+    centre /= np.sqrt(np.einsum("ij,ij->i", centre, centre))[:, None]
+    names[soft] = np.where(face_weight(centre) > 0.5, "face", "scalp")
+    brain = names == "brain"
+    sampled = np.einsum("pn,enk->epk", _SAMPLES, corners[brain])
+    label = load_anatomy().labels.at(head.surfaces.to_atlas(sampled.reshape(-1, 3))).reshape(sampled.shape[:2])
+    white, grey = (label == Tissue.WHITE).sum(axis=1), (label == Tissue.GREY).sum(axis=1)
+    names[brain] = np.where(white > grey, "white_matter", "grey_matter")
+    return names
 
 
 def _part_sets(parts: tuple[Part, ...]) -> tuple[dict[str, tuple[int, ...]], dict[str, int]]:

@@ -124,13 +124,15 @@ def _choose_mounts(nodes: np.ndarray, edge_quads: np.ndarray, mask: dict[str, An
     brow, flap = flat & (np.abs(azimuth) < 55) & (elevation > -15), ~flat & (np.abs(azimuth) < 90)
     chosen = {}
     high, low = mask["side_mount_elevation_deg"]
-    for side, sign in (("left", 1), ("right", -1)):
-        for name, where, distance in (
-            ("brow", brow, np.abs(azimuth - sign * mask["brow_mount_azimuth_deg"])),
-            ("side_high", flap & (azimuth * sign > 0), np.abs(elevation - high)),
-            ("side_low", flap & (azimuth * sign > 0), np.abs(elevation - low)),
-        ):
-            chosen[f"{name}_{side}"] = edge_quads[np.argmin(np.where(where, np.round(distance, 6), np.inf))]
+    for name, where, distance in (
+        ("brow", brow, np.abs(azimuth - mask["brow_mount_azimuth_deg"])),
+        ("side_high", flap & (azimuth > 0), np.abs(elevation - high)),
+        ("side_low", flap & (azimuth > 0), np.abs(elevation - low)),
+    ):
+        left = int(np.argmin(np.where(where, np.round(distance, 6), np.inf)))
+        away = middle - middle[left] * [1, -1, 1]
+        chosen[f"{name}_left"] = edge_quads[left]
+        chosen[f"{name}_right"] = edge_quads[int(np.argmin(np.einsum("ij,ij->i", away, away)))]
     return chosen
 
 
@@ -158,9 +160,8 @@ def _sheet(
             elevation[i, j] = e0 + sign_v * bar_m / 2 / per_e
     bar_u = [-1 if a[0] is None or a[0] != b[0] else a[0] for a, b in pairwise(lines_u)]
     bar_v = [-1 if a[0] is None or a[0] != b[0] else a[0] for a, b in pairwise(lines_v)]
-    reach_u = [
-        abs(azimuth[i + 1, 4] - azimuth[i, 4]) * _metric(surface, azimuth[i, 4], rows[2])[0] for i in range(len(bar_u))
-    ]
+    # measured in the middle of an interval: at an end, left and right would differ
+    reach_u = [abs(b - a) * _metric(surface, (a + b) / 2, rows[2])[0] for a, b in pairwise(azimuth[:, 4].tolist())]
     reach_v = [
         abs(elevation[4, j + 1] - elevation[4, j]) * _metric(surface, azimuth[4, j], elevation[4, j])[1]
         for j in range(len(bar_v))

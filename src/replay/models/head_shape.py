@@ -1,4 +1,4 @@
-"""The analytic head: the surfaces of ``data/heads.yaml`` behind the door of `replay.models.radial`."""
+"""The head by preset: the derived anatomy with the scales and thicknesses of ``data/heads.yaml``."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-import numpy as np
 import yaml
 
-from replay.models.radial import Ellipsoid, RadialSurface, RadialSurfaces, SlopeLimited, SmoothUnion, steepest_slope
+from replay.models.anatomy.surfaces import Offset, OuterSkull, brain_surface, load_anatomy, scalp_surface
+from replay.models.radial import RadialSurface, RadialSurfaces, SlopeLimited, steepest_slope
 
 
 @dataclass(frozen=True)
@@ -22,20 +22,29 @@ class HeadPreset:
         ``nfl``, and what it is.
     surfaces
         The four surfaces.
+    head_mass_kg
+        Mass of the head [kg].
     part_mass_kg
-        Target mass of ``brain``, ``csf``, ``skull``, ``scalp`` [kg].
+        Masses that a source states for parts, by role [kg]; others follow from density and the head's mass.
     helmet_mass_kg
         Mass of the helmet that goes with it, unless a play says otherwise [kg].
     least_thickness_m
         Least thickness of ``csf``, ``skull``, ``scalp`` [m].
+    cg_from_tragion_m
+        Where the centre of gravity should lie from the tragion [m].
+    density_spread
+        How far densities may leave their nominal values for it (one standard deviation, relative).
     """
 
     name: str
     title: str
     surfaces: RadialSurfaces
+    head_mass_kg: float
     part_mass_kg: dict[str, float]
     helmet_mass_kg: float
     least_thickness_m: dict[str, float]
+    cg_from_tragion_m: tuple[float, float, float]
+    density_spread: float
 
 
 def load_data(name: str) -> dict[str, Any]:
@@ -51,13 +60,15 @@ def preset_names() -> tuple[str, ...]:
     return tuple(load_data("heads.yaml")["presets"])
 
 
-def head_preset(name: str) -> HeadPreset:
-    """Build a preset.
+def head_preset(name: str, divisions: int) -> HeadPreset:
+    """Build a preset for a mesh.
 
     Parameters
     ----------
     name
         ``anat``, ``nfl`` or ``article``.
+    divisions
+        Of the cubed sphere: a coarse mesh takes smoother surfaces.
 
     Raises
     ------
@@ -68,36 +79,34 @@ def head_preset(name: str) -> HeadPreset:
     if name not in data["presets"]:
         message = f"no head preset {name!r}; there are {', '.join(data['presets'])}"
         raise ValueError(message)
-    preset = data["presets"][name]
-    limits = data["slope_limit"]
-    shapes = {
-        "brain": data["brain"],
-        "inner_skull": data["inner_skull"],
-        "outer_skull": preset["outer_skull"],
-        "scalp": preset["scalp"],
-    }
-    surfaces = {key: _limited(_surface(shape), float(limits[key])) for key, shape in shapes.items()}
-    brain = np.array(data["brain"][0]["half_axes_m"])
-    masses = {key: float(value) for key, value in data["part_mass_kg"].items()}
-    masses["scalp"] = round(float(preset["head_mass_kg"]) - sum(masses.values()), 9)
+    preset, limits, anatomy = data["presets"][name], data["slope_limit"], load_anatomy()
+    least = {key: float(value) for key, value in data["least_thickness_m"].items()}
+    blur = data["smoothing_deg"]
+    sigma = min(max(blur["per_division"] / divisions, blur["least"]), blur["most"])
+    brain = _limited(brain_surface(preset["brain_scale"]).smoothed(sigma), limits["brain"])
+    scalp = _limited(scalp_surface(preset["scalp_scale"]).smoothed(sigma), limits["scalp"])
+    inner = _limited(Offset(brain, preset["fluid_m"]), limits["inner_skull"])
+    bone = OuterSkull(inner, scalp, preset["calvaria_m"], preset["face_share"], least["scalp"])
     return HeadPreset(
         name=name,
         title=preset["title"],
         surfaces=RadialSurfaces(
-            **surfaces,
-            tragion_m=_triple(data["tragion_m"]),
-            atlas_centre_mm=_triple(data["star_centre_mni_mm"]),
-            atlas_mm_per_m=_triple(np.array(data["atlas_half_extents_mm"]) / brain),
+            brain=brain,
+            inner_skull=inner,
+            outer_skull=_limited(bone, limits["outer_skull"]),
+            scalp=scalp,
+            tragion_m=_triple(preset["scalp_scale"] * value for value in data["tragion_m"]),
+            atlas_centre_mm=_triple(anatomy.star_centre_mni_mm),
+            atlas_mm_per_m=1000.0 / (anatomy.brain_scale * preset["brain_scale"]),
+            atlas_pitch_rad=anatomy.pitch_rad,
         ),
-        part_mass_kg=masses,
+        head_mass_kg=float(preset["head_mass_kg"]),
+        part_mass_kg={key: float(value) for key, value in preset.get("part_mass_kg", {}).items()},
         helmet_mass_kg=float(preset["helmet_mass_kg"]),
-        least_thickness_m={key: float(value) for key, value in data["least_thickness_m"].items()},
+        least_thickness_m=least,
+        cg_from_tragion_m=_triple(data["cg_from_tragion_m"]),
+        density_spread=float(data["density_spread"]),
     )
-
-
-def _surface(shape: list[dict[str, Any]]) -> RadialSurface:
-    bodies = tuple(Ellipsoid(_triple(b["half_axes_m"]), _triple(b.get("centre_m", (0.0, 0.0, 0.0)))) for b in shape)
-    return bodies[0] if len(bodies) == 1 else SmoothUnion(bodies)
 
 
 def _limited(surface: RadialSurface, limit: float) -> RadialSurface:

@@ -15,6 +15,7 @@ MATERIAL_OF_ROLE = {
     "csf": "csf",
     "skull": "skull",
     "scalp": "scalp",
+    "face": "face",
     "comfort_pad": "comfort_foam",
     "energy_pad": "energy_foam",
     "shell": "polycarbonate",

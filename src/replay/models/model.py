@@ -30,6 +30,7 @@ ROLES = (
     "csf",
     "skull",
     "scalp",
+    "face",
     "comfort_pad",
     "energy_pad",
     "shell",

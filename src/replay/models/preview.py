@@ -13,14 +13,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from replay.files import atomic_path
-from replay.models.model import ROLES, Model
+from replay.models.model import Model, Part
 from replay.models.quality import FACES
 
 _COLOURS = {
     "brain": "#e8a0a8",
+    "grey_matter": "#dd8f9a",
+    "white_matter": "#f5dfe0",
     "csf": "#5aa9e6",
     "skull": "#efe6cf",
     "scalp": "#d9a87c",
+    "face": "#e6bd97",
     "comfort_pad": "#9bc995",
     "energy_pad": "#3f8f7b",
     "shell": "#2f4b7c",
@@ -56,13 +59,19 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
         axes.set_title(title, fontsize=11, color="#333333")
     name = f"{model.info.get('preset', 'model')}, {model.info.get('resolution', '')}"
     figure.suptitle(f"{name}: {len(model.hexes):,} hexahedra, {len(model.nodes):,} nodes", fontsize=14, y=0.975)
-    present = [role for role in ROLES if any(part.role == role for part in model.parts)]
+    looks = {_look(part) for part in model.parts}
+    present = [look for look in _COLOURS if look in looks]
     figure.legend(
         handles=[Patch(facecolor=_COLOURS[r], edgecolor="#555555", label=r.replace("_", " ")) for r in present],
         loc="lower center", ncol=len(present), frameon=False, fontsize=10, handlelength=1.2, columnspacing=1.4,
     )  # fmt: skip
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dots_per_inch, format="png", metadata={"Software": None})
+
+
+def _look(part: Part) -> str:
+    """Key of a part's colour: its own name where there is one, its role elsewhere."""
+    return part.name if part.name in _COLOURS else part.role
 
 
 def outer_faces(hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -98,8 +107,7 @@ def _paint(axes: Axes, model: Model, shown: np.ndarray, azimuth_deg: float, elev
     seen = np.flatnonzero(np.einsum("ij,j->i", normal, toward) > 1e-3)
     depth = np.einsum("ijk,k->ij", corners[seen], toward).mean(axis=1)
     seen = seen[np.argsort(np.round(depth, 9), kind="stable")]
-    roles = [part.role for part in model.parts]
-    base = np.array([to_rgb(_COLOURS[r]) for r in roles])[model.element_part[rows][owner[seen]]]
+    base = np.array([to_rgb(_COLOURS[_look(part)]) for part in model.parts])[model.element_part[rows][owner[seen]]]
     light = _LIGHT[0] * right + _LIGHT[1] * up + _LIGHT[2] * toward
     shade = 0.58 + 0.42 * np.clip(np.einsum("ij,j->i", normal[seen], light / np.sqrt(light @ light)), 0, 1)
     colours = np.clip(base * shade[:, None], 0, 1)

@@ -1,7 +1,7 @@
 """Star-shaped surfaces: the radius in each direction from one centre.
 
 This is the door through which anatomy enters: whatever gives a radius for a direction can be a brain, a skull or
-a scalp (ellipsoids here; measured surfaces pass through the same door). What is between the door and the mesh
+a scalp (`anatomy.surfaces`; an ellipsoid where a test wants a closed form). What is between the door and the mesh
 is here too: the limit on the slope, without which hexes of a radial grid invert, and the smoothing.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -56,28 +57,6 @@ class Ellipsoid:
 
 
 @dataclass(frozen=True)
-class SmoothUnion:
-    """The union of star-shaped bodies with a rounded seam: the p-norm of their radii.
-
-    Parameters
-    ----------
-    bodies
-        The surfaces.
-    sharpness
-        p; the seam is rounded over about 1/p of the radius, and radii grow by at most ``len(bodies)**(1/p)``.
-    """
-
-    bodies: tuple[RadialSurface, ...]
-    sharpness: float = 12.0
-
-    def __call__(self, directions: np.ndarray) -> np.ndarray:
-        """Radius [m]."""
-        radii = np.stack([body(directions) for body in self.bodies])
-        largest = radii.max(axis=0)
-        return largest * np.sum((radii / largest) ** self.sharpness, axis=0) ** (1 / self.sharpness)
-
-
-@dataclass(frozen=True)
 class SlopeLimited:
     """The smallest surface outside another whose slope ``|d ln r / d theta|`` nowhere exceeds a limit.
 
@@ -97,13 +76,16 @@ class SlopeLimited:
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radius [m]: the upper envelope ``max_j r_j exp(-limit * angle_j)`` over directions j."""
         own = self.surface(directions)
-        samples = sample_directions()
-        log_radii = np.log(self.surface(samples))
+        samples, log_radii = sample_directions(), self._log_radii
         envelope = np.empty(len(directions))
         for start in range(0, len(directions), 512):
             part = slice(start, start + 512)
             envelope[part] = (log_radii - self.limit * angles(directions[part], samples)).max(axis=1)
         return np.maximum(own, np.exp(envelope))
+
+    @cached_property
+    def _log_radii(self) -> np.ndarray:
+        return np.log(self.surface(sample_directions()))
 
 
 @dataclass(frozen=True)
@@ -123,14 +105,17 @@ class Smoothed:
 
     def __call__(self, directions: np.ndarray) -> np.ndarray:
         """Radius [m]: the weighted mean over directions."""
-        samples = sample_directions()
-        radii = self.surface(samples)
+        samples, radii = sample_directions(), self._radii
         out = np.empty(len(directions))
         for start in range(0, len(directions), 512):
             part = slice(start, start + 512)
             weight = np.exp(-0.5 * (angles(directions[part], samples) / np.radians(self.sigma_deg)) ** 2)
             out[part] = (weight * radii).sum(axis=1) / weight.sum(axis=1)
         return out
+
+    @cached_property
+    def _radii(self) -> np.ndarray:
+        return self.surface(sample_directions())
 
 
 @dataclass(frozen=True)
@@ -146,7 +131,9 @@ class RadialSurfaces:
     atlas_centre_mm
         Position of the star centre in MNI coordinates (x right, y anterior, z superior) [mm].
     atlas_mm_per_m
-        Stretch from head axes to atlas millimetres along x anterior, y left, z superior.
+        Atlas millimetres per metre of the head.
+    atlas_pitch_rad
+        Angle by which the head's x axis falls below the atlas's y axis [rad].
     """
 
     brain: RadialSurface
@@ -155,12 +142,14 @@ class RadialSurfaces:
     scalp: RadialSurface
     tragion_m: tuple[float, float, float]
     atlas_centre_mm: tuple[float, float, float]
-    atlas_mm_per_m: tuple[float, float, float]
+    atlas_mm_per_m: float
+    atlas_pitch_rad: float
 
     def to_atlas(self, points: np.ndarray) -> np.ndarray:
         """MNI coordinates [mm] of points (n, 3) [m] relative to the star centre."""
-        x, y, z = (points * np.array(self.atlas_mm_per_m)).T
-        return np.stack([-y, x, z], axis=1) + np.array(self.atlas_centre_mm)
+        x, y, z = (points * self.atlas_mm_per_m).T
+        c, s = np.cos(self.atlas_pitch_rad), np.sin(self.atlas_pitch_rad)
+        return np.stack([-y, c * x + s * z, c * z - s * x], axis=1) + np.array(self.atlas_centre_mm)
 
 
 def sample_directions() -> np.ndarray:

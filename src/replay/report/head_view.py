@@ -20,6 +20,7 @@ ROLE_COLOURS = {
     "csf": "#9fd0ea",
     "skull": "#efe3bf",
     "scalp": "#d9b48f",
+    "face": "#e3c4a2",
     "comfort_pad": "#b7d7a8",
     "energy_pad": "#7fb77e",
     "shell": "#5f7ea3",
@@ -111,7 +112,7 @@ def strain_picture(mesh: MeshView, snapshots: Snapshots, columns: int = 4) -> Pi
     # Cut the scale at the 99.5th percentile: one bad element must not turn the rest dark.
     top = float(np.nanpercentile(snapshots.values[chosen], 99.5)) or 1.0
     scale, colour_map = Normalize(0, top), colormaps["viridis"]
-    head = np.isin(mesh.element_role, ["brain", "csf", "skull", "scalp"])
+    head = np.isin(mesh.element_role, ["brain", "csf", "skull", "scalp", "face"])
     with house_style():
         figure, axes = new_figure((10.0, 4.7), rows=2, columns=len(chosen))
         for row, plane in enumerate(("sagittal", "axial")):
