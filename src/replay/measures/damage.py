@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from replay.measures.brain import WHOLE_BRAIN
+from replay.measures.brain import WHOLE_BRAIN, BrainView
 from replay.solver.kernels.pore_growth import advance_pores
 from replay.tables import Column, TableFormat
 
@@ -78,26 +78,11 @@ SENSITIVITY_TABLE = TableFormat(
 )
 
 
-class DamageView(Protocol):
+class DamageView(BrainView, Protocol):
     """What the recorder needs to see of a state of the solver."""
-
-    @property
-    def time_s(self) -> float:
-        """Time of the state [s]."""
-
-    @property
-    def stress(self) -> NDArray[np.float64]:
-        """Cauchy stress (m, 6), xx, yy, zz, xy, yz, zx [Pa]."""
-
-    @property
-    def volumes(self) -> NDArray[np.float64]:
-        """Volumes (m,) [m^3]."""
 
     def variable(self, name: str) -> NDArray[np.float64]:
         """State variable of the laws by name (m,)."""
-
-    def deformation_gradient(self) -> NDArray[np.float64]:
-        """Return F of every element, (m, 3, 3)."""
 
 
 class DamageRecorder:
