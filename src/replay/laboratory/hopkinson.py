@@ -1,8 +1,8 @@
 """The specimen of a split Hopkinson bar: a cylinder of tissue between two platens, its shape and its diameter.
 
-The bars of the published set-up (E 2391.2 MPa, nu 0.36) are 1e5 times stiffer than tissue, so the platens are rigid
-faces that close at a constant speed. They hold the specimen's ends (``glued``) or only press them (``lubricated``);
-friction in between needs contact. A quarter of the cylinder is computed.
+The bars of the published set-up (E 2391.2 MPa, nu 0.36) are 1e5 times stiffer than tissue, so the platens are rigid and
+close at a constant speed. They hold the specimen's ends (``glued``), rub them (``frictional``: rigid plates in contact,
+with Coulomb friction) or only press them (``lubricated``). A quarter of the cylinder is computed.
 """
 
 from __future__ import annotations
@@ -15,10 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.solver import Controls, Material, Problem, SolverPart, solve
+from replay.solver import (
+    ContactControls,
+    ContactPair,
+    Controls,
+    Material,
+    PrescribedMotion,
+    Problem,
+    SolverPart,
+    solve,
+)
+from replay.solver.blocks import structured_block
 from replay.solver.view import StateView
 
-ENDS = ("glued", "lubricated")
+ENDS = ("glued", "frictional", "lubricated")
+#: Coulomb's coefficient of wet tissue on a polished platen: assumed.
+FRICTION = 0.2
 #: Strains of the article's Figure 4.
 SHAPES = (0.15, 0.29, 0.47)
 
@@ -101,11 +113,24 @@ def quarter_cylinder(specimen: Specimen) -> tuple[NDArray[np.float64], NDArray[n
     return nodes, np.concatenate(hexes).astype(np.int64)
 
 
+def platens(specimen: Specimen) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Two plates of one hexahedron, below and above the specimen; the lower one comes first.
+
+    Their corners lie where the specimen does not come: a node of a plate that its rim passes would hold the rim.
+    """
+    width, thickness, start = 2.5 * specimen.radius_m, 0.2 * specimen.radius_m, -0.5 * specimen.radius_m
+    sheets = [
+        structured_block((1, 1, 1), (width - start, width - start, thickness), (start, start, z))
+        for z in (-thickness, specimen.height_m)
+    ]
+    (low, hexes), (high, more) = sheets
+    return np.vstack([low, high]), np.vstack([hexes, more + len(low)])
+
+
 class _Profile:
     """Records the free surface: mean radius at every height."""
 
-    def __init__(self, problem: Problem, specimen: Specimen) -> None:
-        reference = problem.nodes
+    def __init__(self, reference: NDArray[np.float64], specimen: Specimen) -> None:
         on_surface = np.hypot(reference[:, 0], reference[:, 1]) > specimen.radius_m * (1 - 1e-9)
         levels = np.unique(reference[:, 2])
         self._rows = [np.flatnonzero(on_surface & (reference[:, 2] == z)) for z in levels]
@@ -114,7 +139,7 @@ class _Profile:
 
     def sample(self, view: StateView) -> None:
         """Take the state at a history time."""
-        x = view.coordinates
+        x = view.coordinates  # the specimen's nodes are the first
         rows = [[x[r, 2].mean(), np.hypot(x[r, 0], x[r, 1]).mean()] for r in self._rows]
         self.times.append(view.time_s)
         self.profiles.append(np.array(rows))
@@ -133,7 +158,7 @@ class _Profile:
 
 def squeeze(
     material: Material, ends: str, folder: Path, *, specimen: Specimen | None = None, rate_per_s: float = 750.0,
-    strain: float = 0.48, threads: int | None = None,
+    strain: float = 0.48, friction: float = FRICTION, threads: int | None = None,
 ) -> Squeeze:  # fmt: skip
     """Press the specimen at a constant nominal rate.
 
@@ -142,13 +167,15 @@ def squeeze(
     material
         Of the specimen.
     ends
-        ``glued``: the platens hold the ends; ``lubricated``: the ends slide.
+        ``glued``: the platens hold the ends; ``frictional``: they rub them; ``lubricated``: the ends slide.
     folder
         Receives the run's own files.
     specimen
         The published one by default.
     rate_per_s, strain
         Nominal strain rate, and where to stop.
+    friction
+        Coefficient of ``frictional`` ends.
     threads
         Of the solver.
     """
@@ -160,13 +187,14 @@ def squeeze(
     low, high = nodes[:, 2] == 0.0, nodes[:, 2] == nodes[:, 2].max()
     fixed = np.zeros(nodes.shape, bool)
     fixed[:, 0], fixed[:, 1] = nodes[:, 0] < 1e-12, nodes[:, 1] < 1e-12
-    fixed[:, 2] = low | high
+    if ends != "frictional":
+        fixed[:, 2] = low | high
     if ends == "glued":
         fixed[low | high] = True
     # a linear field of velocity, so that no wave is sent in at the start
     velocity = np.zeros(nodes.shape)
     velocity[:, 2] = -rate_per_s * nodes[:, 2]
-    if ends == "lubricated":
+    if ends != "glued":
         velocity[:, :2] = 0.5 * rate_per_s * nodes[:, :2]
     velocity[fixed & (np.arange(3) < 2)] = 0.0
     end = strain / rate_per_s
@@ -177,10 +205,38 @@ def squeeze(
         nodes, hexes, np.zeros(len(hexes), int), (SolverPart(1, "specimen", material),), controls,
         initial_velocity=velocity, fixed=fixed,
     )  # fmt: skip
-    profile = _Profile(problem, specimen)
+    profile = _Profile(nodes, specimen)
+    if ends == "frictional":
+        problem = _between_platens(problem, specimen, rate_per_s * specimen.height_m, friction)
     solve(problem, folder, recorders=[profile], threads=threads, progress=None, resume=False)
     strains = rate_per_s * np.array(profile.times)
     first = np.array([specimen.height_m, specimen.radius_m])
     shapes = {at: profile.profiles[int(np.argmin(np.abs(strains - at)))] / first for at in SHAPES if at <= strains[-1]}
     means = [np.trapezoid(p[:, 1], p[:, 0]) / (p[-1, 0] - p[0, 0]) / specimen.radius_m for p in profile.profiles]
     return Squeeze(ends, strains, np.array(means), shapes)
+
+
+def _between_platens(problem: Problem, specimen: Specimen, closing_m_per_s: float, friction: float) -> Problem:
+    """Put rigid plates on both ends, the lower at rest, the upper closing, with contact and friction between."""
+    nodes, hexes = platens(specimen)
+    count = len(problem.nodes)
+    plate = Material("platen", "rigid", 7800.0, {"youngs_modulus_pa": 2391.2e6, "poisson_ratio": 0.36})
+    part = np.repeat([1, 2], len(hexes) // 2)
+    end = problem.controls.termination_time_s
+    motions = []
+    for pid, speed in ((2, 0.0), (3, -closing_m_per_s)):
+        times = np.array([0.0, 1.01 * end])
+        path = np.array([[0.0, 0.0, speed * t] for t in times])
+        still, level = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
+        motions.append(PrescribedMotion((pid,), times, path, level, still + [0.0, 0.0, speed], still))
+    return Problem(
+        np.vstack([problem.nodes, nodes]),
+        np.vstack([problem.hexes, hexes + count]),
+        np.concatenate([problem.element_part, part]),
+        (*problem.parts, SolverPart(2, "lower platen", plate), SolverPart(3, "upper platen", plate)),
+        problem.controls,
+        initial_velocity=np.vstack([problem.initial_velocity, np.zeros(nodes.shape)]),
+        fixed=np.vstack([problem.fixed, np.zeros(nodes.shape, bool)]),
+        prescribed=tuple(motions),
+        contact=ContactControls(pairs=(ContactPair((1,), (2, 3), friction, name="specimen-platens"),)),
+    )
