@@ -100,21 +100,22 @@ def specimen_picture(
     with house_style():
         fig, (shape, diameter) = new_figure((2 * HALF[0], 1.25 * HALF[1]), columns=2)
         for k, (ends, (strains, diameters, profiles)) in enumerate(squeezes.items()):
-            for j, (at, profile) in enumerate(profiles.items()):
+            for at, profile in profiles.items():
                 z, r = profile.T
-                outline = np.concatenate([r, -r[::-1], r[:1]]), np.concatenate([z, z[::-1], z[:1]])
-                label = f"{ends}, strain {at:g}"
-                shape.plot(outline[0] + 3.2 * j, outline[1], color=CYCLE[k], ls=DASHES[k], label=label)
+                name = ends if at == min(profiles) else None
+                shape.plot(r, z - z.mean(), color=CYCLE[k], ls=DASHES[k], label=name)
+                if k == 0:
+                    shape.annotate(
+                        f"strain {at:g}", (r.max(), 0.0), (3, 0), textcoords="offset points", rotation=90, va="center",
+                        fontsize=7,
+                    )  # fmt: skip
             diameter.plot(strains, diameters, color=CYCLE[k], ls=DASHES[k], label=f"model, {ends}")
         e = np.linspace(0, max(float(s.max()) for s, _, _ in squeezes.values()), 50)
         diameter.plot(e, (1 - e) ** -0.5, color=CYCLE[6], lw=0.9, ls=":", label="incompressible, no barrel")
-        shape.set(
-            title="Shape of the specimen", xlabel="radius over first radius, side by side", ylabel="height over first"
-        )
-        shape.set_aspect("equal")
+        shape.set(title="Free surface", xlabel="radius over first", ylabel="height over first, from the middle")
         diameter.set(title="Mean diameter", xlabel="nominal compressive strain", ylabel="diameter over first")
-        legend_below(shape, 2)
-        legend_below(diameter, 1)
+        legend_below(shape, 3)
+        legend_below(diameter, 2)
         return finish(fig, "figure_4_hopkinson", "Shapes and mean diameter of a specimen between platens.", caption)
 
 
