@@ -171,7 +171,9 @@ def test_the_specimen_keeps_its_volume_and_barrels_only_where_it_is_held(tmp_pat
 
 def test_platens_without_friction_press_like_a_constraint_and_sticky_ones_like_glue(tmp_path: Path) -> None:
     specimen, keep = Specimen(divisions=2), {"strain": 0.3, "threads": 1}
-    held = {ends: squeeze(brain(), ends, tmp_path / ends, specimen=specimen, **keep) for ends in ("lubricated", "glued")}
+    held = {
+        ends: squeeze(brain(), ends, tmp_path / ends, specimen=specimen, **keep) for ends in ("lubricated", "glued")
+    }
     free, stuck = (
         squeeze(brain(), "frictional", tmp_path / str(mu), specimen=specimen, friction=mu, **keep) for mu in (0.0, 20.0)
     )

@@ -228,7 +228,7 @@ def _between_platens(problem: Problem, specimen: Specimen, closing_m_per_s: floa
         times = np.array([0.0, 1.01 * end])
         path = np.array([[0.0, 0.0, speed * t] for t in times])
         still, level = np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
-        motions.append(PrescribedMotion((pid,), times, path, level, still + [0.0, 0.0, speed], still))
+        motions.append(PrescribedMotion((pid,), times, path, level, still + np.array([0.0, 0.0, speed]), still))
     return Problem(
         np.vstack([problem.nodes, nodes]),
         np.vstack([problem.hexes, hexes + count]),

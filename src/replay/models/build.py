@@ -204,7 +204,8 @@ def _mesh(
     outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, helmet, seat)
     mask = facemask_mesh(outer.nodes, outer.edge_quads, head.surfaces.scalp, helmet, setting.facemask_step_m)
     names = np.concatenate([names, outer.part, np.full(len(mask.hexes), "facemask")])
-    cup = np.unique(outer.hexes[outer.part == "chin_cup"][:, 4:])
+    foam = outer.hexes[outer.part == "chin_cup"]
+    cup = np.setdiff1d(foam[:, 4:], foam[:, :4])
     return mask.nodes, np.vstack([inner.hexes, outer.hexes, mask.hexes]), names, mask.mounts, cup
 
 

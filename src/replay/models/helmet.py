@@ -95,8 +95,12 @@ def helmet_mesh(
     inner, outer = levels[level], levels[level + 1]
     edge_quads = np.stack([inner[rim[:, 0]], inner[rim[:, 1]], outer[rim[:, 1]], outer[rim[:, 0]]], axis=1)
     reach = ray_stretch(scalp, d) * helmet["chin"]["thickness_m"]
-    cup = builder.level(skin + d * reach[:, None])
-    builder.extrude(_sole(builder, head, seat), cup, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+    inside = _sole(builder, head, seat)
+    # two layers: one alone is sheared by hourglass modes
+    for share in (0.5, 1.0):
+        outside = builder.level(skin + d * (share * reach)[:, None])
+        builder.extrude(inside, outside, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+        inside = outside
     return builder.finish(edge_quads)
 
 
