@@ -20,7 +20,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "tables": {"errors", "files"},
     "manifest": {"errors", "files"},
     "documents": {"errors", "files"},
-    "play": {"documents", "errors", "files"},
+    "play": {"play", "documents", "errors", "files"},
     "controls": {"documents", "play"},
 }
 VAGUE = {"utils", "util", "helpers", "helper", "misc", "common", "core"}

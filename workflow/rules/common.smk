@@ -11,7 +11,7 @@ LEAVES = (
     "files.py",
     "tables.py",
     "manifest.py",
-    "play.py",
+    "play",
 )
 PLAYS = config["plays_folder"]
 TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
@@ -23,8 +23,8 @@ def code(*rooms):
 
     Snakemake does not see imports; as inputs, an edit of any of them reruns the stage.
     """
-    files = [SOURCE / leaf for leaf in LEAVES]
-    for room in rooms:
+    files = []
+    for room in (*LEAVES, *rooms):
         path = SOURCE / room
         files += (
             sorted(p for p in path.rglob("*") if p.suffix in (".py", ".yaml"))

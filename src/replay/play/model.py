@@ -1,0 +1,66 @@
+"""What was worn, and the finite-element model that stands for it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from replay.documents import Number, Setting, refuse
+from replay.play.fields import Positive, Vector3
+
+HELMET_MASS_KG = 1.82
+"""Target mass of a helmet, protocol step 1.3."""
+HELMET_MASS_RANGE_KG = 0.5
+"""Acceptance range around the target, protocol step 1.3."""
+
+
+class Helmet(Setting):
+    """The physical helmet that was worn."""
+
+    model: str = Field(default="classic", description="Name of the helmet model.", min_length=1)
+    mass_kg: Number = Field(default=1.83, description="Mass as worn [kg]; 1.82 +- 0.5 is accepted (protocol 1.3).")
+    mass_tolerance_kg: Positive = Field(
+        default=0.05, description="Agreement asked of the finite-element helmet's mass [kg]."
+    )
+    cg_tolerance_m: Positive = Field(
+        default=0.010, description="Agreement asked of the finite-element helmet's CG [m]."
+    )
+    offset_m: Vector3 = Field(
+        default=(0.0, 0.0, 0.0),
+        description="Displacement of the helmet from its nominal seat, head axes [m]; for a helmet seated by contact.",
+    )
+    padding: str = Field(default="not recorded", description="Padding set and size (protocol 1.2).")
+    chinstrap: str = Field(default="not recorded", description="Routing of the chin strap (protocol 1.2).")
+
+    @field_validator("mass_kg")
+    @classmethod
+    def _plausible(cls, value: float) -> float:
+        if abs(value - HELMET_MASS_KG) > HELMET_MASS_RANGE_KG + 1e-12:
+            refuse(
+                "is no mass of a football helmet",
+                f"{HELMET_MASS_KG} +- {HELMET_MASS_RANGE_KG} kg",
+                "weigh the helmet with facemask and pads, in kilograms",
+            )
+        return value
+
+
+class ModelChoice(Setting):
+    """The finite-element model."""
+
+    preset: Literal["nfl"] = Field(default="nfl", description="Family of head and helmet.")
+    resolution: Literal["tiny", "coarse", "medium", "fine"] = Field(default="coarse", description="Mesh resolution.")
+    brain_material: Literal["brain_isv", "viscohyperelastic"] = Field(
+        default="brain_isv",
+        description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
+    )
+    helmet_structure: Literal["rigid", "deformable"] = Field(
+        default="rigid",
+        description="Shell and facemask: `rigid` as one body; `deformable` elastic, one hex across, whose bending the "
+        "hourglass gate refuses at these resolutions.",
+    )
+    helmet_seat: Literal["shared_nodes", "contact"] = Field(
+        default="shared_nodes",
+        description="Pads and chin cup on the scalp: `shared_nodes` joins them to it; `contact` lets them slide and "
+        "lift off, held by chin straps: contact does not pass the numerics gate on this helmet yet.",
+    )
