@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from numba import types
 from numba.core import config
 from test_brain_isv import BRAIN, LAW, value
 
-from replay.solver import Controls, Material, Problem, SolverPart
+from replay.solver import Controls, Material, Problem, SolverPart, solve
 from replay.solver.integrator import Integrator
 from replay.solver.kernels.element import Control
 from replay.solver.kernels.lanes import compile_law
@@ -65,17 +66,20 @@ def test_a_small_step_is_the_whole_one_or_says_that_it_is_not(exponent: float) -
     assert worst < 1e-9
 
 
-def pair(violent: float) -> Integrator:
-    """One step of two elements apart from one another: the first sheared gently, the second `violent` times as fast."""
+def two_elements(violent: float, end: float = 1.0) -> Problem:
+    """Two elements apart from one another: the first sheared gently, the second `violent` times as fast."""
     cube = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
     nodes = np.vstack([cube, cube + np.array([0.1, 0.0, 0.0])])
     velocity = np.zeros_like(nodes)
     velocity[:, 0] = RATE * nodes[:, 1] * np.repeat([1.0, violent], 8)
     part = SolverPart(1, "brain", Material("brain", LAW, 1040.0, BRAIN))
-    controls = Controls(1.0, mass_scaling_time_step_s=0.0)
-    run = Integrator(
-        Problem(nodes, np.arange(16).reshape(2, 8), np.zeros(2, int), (part,), controls, initial_velocity=velocity), 1e9
-    )
+    controls = Controls(end, mass_scaling_time_step_s=0.0)
+    return Problem(nodes, np.arange(16).reshape(2, 8), np.zeros(2, int), (part,), controls, initial_velocity=velocity)
+
+
+def one_step(violent: float) -> Integrator:
+    """Both elements after one step of `STEP`."""
+    run = Integrator(two_elements(violent), 1e9)
     run.forces()
     run.kick(STEP, drift=True)
     run.drift(STEP, STEP)
@@ -85,7 +89,7 @@ def pair(violent: float) -> Integrator:
 
 def test_an_element_takes_the_whole_step_by_itself_and_its_neighbours_do_not_notice() -> None:
     violent = 2000.0
-    alone, mixed = pair(1.0), pair(violent)
+    alone, mixed = one_step(1.0), one_step(violent)
     point = Point(LAW, **BRAIN)
     f = np.eye(3)
     f[0, 1] = STEP * RATE * violent
@@ -96,6 +100,12 @@ def test_an_element_takes_the_whole_step_by_itself_and_its_neighbours_do_not_not
         assert gentle == alone.variable(name)[0] >= 0.0
         assert fast == pytest.approx(value(point, name), rel=1e-6, abs=1e-13), name
     assert mixed.variable("equivalent_plastic_strain")[1] > 0.1
+
+
+def test_a_run_tells_what_its_steps_have_left_of_the_flow_equation(tmp_path: Path) -> None:
+    told = solve(two_elements(3.0, 2e-3), tmp_path, progress=None).flow_residual
+    assert told is not None
+    assert 0.0 < told < 1e-10
 
 
 @pytest.mark.slow
