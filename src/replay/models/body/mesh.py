@@ -221,7 +221,8 @@ def _bones(
 ) -> np.ndarray:
     """Hexes of bone: a segment's whole length, but no node of another bone.
 
-    Short segments choose first: neck, hands, feet, then from the trunk outwards, so that none is left without.
+    Whoever chooses first takes what touches its neighbours, and leaves them a layer of flesh at the joint: hands and
+    feet, so that they are not left without, then from the trunk outwards. Only the neck keeps a layer at both ends.
     """
     centre = nodes[hexes].mean(axis=1)
     owner = np.full(len(nodes), -1)
@@ -234,14 +235,13 @@ def _bones(
         if not len(own):
             continue
         distance, _ = cKDTree(_dense(posed.ends[name], 0.004)).query(centre[own])
-        free = (np.isin(owner[hexes[own]], [-1, k])).all(axis=1)
-        if tissue == "rigid":
-            shared = np.isin(hexes[own], hexes[segment != k]).any(axis=1)
-            chosen = free & ~shared
-        else:
-            chosen = free & (distance <= np.maximum(_BONE_RADIUS_M, 0.0))
-        if not chosen.any() and free.any():
-            chosen = free & (distance <= distance[free].min() + 1e-9)
+        free = np.isin(owner[hexes[own]], [-1, k]).all(axis=1)
+        chosen = free if tissue == "rigid" else free & (distance <= _BONE_RADIUS_M)
+        if name == "neck":
+            chosen = chosen & ~np.isin(hexes[own], hexes[segment != k]).any(axis=1)
+        if free.any() and not chosen.any():  # a limb thinner than its voxels, a neck of three layers: its middle alone
+            away = np.sqrt(np.sum((centre[own] - posed.ends[name].mean(axis=0)) ** 2, axis=1))
+            chosen = free & (away <= away[free].min() + 1e-9)
         bone[own[chosen]] = True
         owner[hexes[own[chosen]]] = k
     return bone

@@ -203,11 +203,11 @@ def _merged(
             element_part[own] = len(parts)
             parts.append(Part(first + k + 1, name, role, "body", name))
             facts = data[role]
-            own_numbers = "neck_parameters" if segment == "neck" and role == "flesh" else "parameters"
+            soft = role == "flesh" and (body["tissue"] == "rigid" or segment == "neck")
             materials[name] = {
                 "law": facts["law"],
                 "density_kg_per_m3": density[segment],
-                "parameters": dict(facts[own_numbers]),
+                "parameters": dict(facts["joint_parameters" if soft else "parameters"]),
                 "certainty": dict(facts["certainty"]),
                 "source": facts["source"],
             }
