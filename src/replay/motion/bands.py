@@ -2,8 +2,12 @@
 
 The posterior knows the noise of the clicks but not how real motions differ from its shapes. So its centre is shifted
 and its spread multiplied by constants under which, on motions with a known truth, 95 % of the truths lay inside
-(split conformal, by the width of the posterior). The constants lie in ``data/bands.yaml``, made by
+(split conformal, by the width of the posterior and the frame rate). The constants lie in ``data/bands.yaml``, made by
 ``benchmarks/calibrate_bands.py``. A band too wide to be a measurement is replaced by the words for it.
+
+The instant of peak angular acceleration is no centre with a width: impacts have several lobes of like height, and which
+is greatest is often not in the footage. Its band is the set of instants at which the drawn motions' acceleration, each
+over its own peak, is in the mean above a calibrated share of its greatest: one interval, or several that compete.
 """
 
 from __future__ import annotations
@@ -23,30 +27,66 @@ NOT_RESOLVABLE = "not resolvable from this footage"
 WIDEST_RATIO = 3.0
 """A peak whose upper bound is further than this from its lower one is not measured."""
 WIDEST_INSTANT_S = 0.040
-"""An instant whose band is wider than this is not measured [s]."""
+"""An instant whose band is longer than this, all its parts together, is not measured [s]."""
 RATIOS = ("omega_rad_per_s", "alpha_rad_per_s2", "a_m_per_s2", "a_across_m_per_s2", "a_along_m_per_s2")
 """Peaks, whose errors are shares."""
-QUANTITIES = (*RATIOS, "t0_s")
+QUANTITIES = (*RATIOS, "t0_s", "onset_s")
 CURVES = ("omega", "alpha", "a")
 """Curves over time, whose bands are a multiple of the posterior's standard deviation."""
-_LEAST = {"t0_s": 5.0e-4, "omega_rad_per_s": 0.01}
+BEFORE = ("velocity", "omega")
+"""Velocities just before the impact, whose bands are too."""
+_LEAST = {"onset_s": 5.0e-4, "omega_rad_per_s": 0.01}
 _LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)
+class Part:
+    """One interval of a band that is not in one piece, and the share of the draws whose value lies in it."""
+
+    low: float
+    high: float
+    share: float
+
+
+@dataclass(frozen=True)
 class Band:
-    """A number with its 95 % band; ``resolved`` is False where the band is too wide to be a measurement."""
+    """A number with its 95 % band; ``resolved`` is False where the band is too wide to be a measurement.
+
+    Parameters
+    ----------
+    value, low, high
+        Most likely value, and ends of the band.
+    resolved
+        See above.
+    parts
+        Intervals that the band consists of, where it is not in one piece.
+    """
 
     value: float
     low: float
     high: float
     resolved: bool
+    parts: tuple[Part, ...] = ()
 
-    def text(self, scale: float = 1.0, digits: int = 3) -> str:
-        """``value (low to high)``, or the words that say there is none."""
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lower and upper end."""
+        return self.low, self.high
+
+    def covers(self, truth: float) -> bool:
+        """Whether a value lies in the band."""
+        pieces = [(part.low, part.high) for part in self.parts] or [(self.low, self.high)]
+        return any(low <= truth <= high for low, high in pieces)
+
+    def text(self, scale: float = 1.0, form: str = ".3g") -> str:
+        """``value (low to high)``, the parts that compete, or the words that say there is none."""
         if not self.resolved:
             return NOT_RESOLVABLE
-        return f"{self.value / scale:.{digits}g} ({self.low / scale:.{digits}g} to {self.high / scale:.{digits}g})"
+        if self.parts:
+            pieces = (f"{p.low / scale:{form}} to {p.high / scale:{form}} ({100 * p.share:.0f} %)" for p in self.parts)
+            return " or ".join(pieces)
+        value, low, high = (f"{x / scale:{form}}" for x in (self.value, *self.ends))
+        return f"{value} ({low} to {high})"
 
 
 @dataclass(frozen=True)
@@ -59,14 +99,18 @@ class Spread:
 
 def spread(name: str, values: np.ndarray) -> Spread:
     """Median and half the distance between the 16th and 84th percentile of the draws."""
-    x = np.log(np.maximum(values, 1e-12)) if name in RATIOS else values
-    low, middle, high = np.quantile(x, [0.16, 0.5, 0.84])
-    return Spread(float(middle), max(0.5 * float(high - low), _LEAST.get(name, _LEAST_SHARE)))
+    return spread_of(name, *np.quantile(values, [0.16, 0.5, 0.84]))
+
+
+def spread_of(name: str, *quantiles: float) -> Spread:
+    """`spread` from the 16th, 50th and 84th percentile of the draws."""
+    x = np.log(np.maximum(quantiles, 1e-12)) if name in RATIOS else np.asarray(quantiles)
+    return Spread(float(x[1]), max(0.5 * float(x[2] - x[0]), _LEAST.get(name, _LEAST_SHARE)))
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Constants of one quantity, interpolated over the logarithm of the posterior's width.
+    """Constants of one quantity at one frame rate, interpolated over the logarithm of the posterior's width.
 
     Parameters
     ----------
@@ -82,36 +126,86 @@ class Calibration:
     shift: tuple[float, ...]
     reach: tuple[float, ...]
 
-    def apply(self, name: str, found: Spread) -> Band:
-        """Shift and widen."""
-        at = float(np.log(found.width))
+    def at(self, width: float) -> tuple[float, float]:
+        """Shift and reach."""
         knots = np.log(self.widths)
-        shift, reach = (float(np.interp(at, knots, values)) for values in (self.shift, self.reach))
-        centre = found.centre + shift * found.width
-        bounds = centre - reach * found.width, centre, centre + reach * found.width
-        if name in RATIOS:
-            low, value, high = (float(np.exp(x)) for x in bounds)
-            return Band(value, low, high, high <= WIDEST_RATIO * low)
-        low, value, high = bounds
-        return Band(value, low, high, high - low <= WIDEST_INSTANT_S)
+        shift, reach = (float(np.interp(np.log(width), knots, values)) for values in (self.shift, self.reach))
+        return shift, reach
 
 
 @dataclass(frozen=True)
 class Constants:
-    """Everything in ``data/bands.yaml``."""
+    """Everything in ``data/bands.yaml``: one entry a frame rate, interpolated over its logarithm.
 
-    peaks: dict[str, Calibration]
-    curves: dict[str, float]
+    Parameters
+    ----------
+    rates
+        Frame rates of the calibration [Hz].
+    peaks
+        By quantity.
+    curves, before
+        Multiples of the standard deviation.
+    instant
+        Least share of its greatest value that the drawn motions' mean relative acceleration has at t0.
+    calibrated
+        Range of each fact of the footage.
+    """
+
+    rates: tuple[float, ...]
+    peaks: dict[str, tuple[Calibration, ...]]
+    curves: dict[str, tuple[float, ...]]
+    before: dict[str, tuple[float, ...]]
+    instant: tuple[float, ...]
     calibrated: dict[str, tuple[float, float]]
 
     @classmethod
     def of(cls, raw: dict[str, Any]) -> Constants:
         """From the file's content."""
         return cls(
-            {n: Calibration(**{k: tuple(v) for k, v in c.items()}) for n, c in raw["peaks"].items()},
-            {n: float(v) for n, v in raw["curves"].items()},
+            tuple(raw["rates"]),
+            {n: tuple(Calibration(**{k: tuple(v) for k, v in c.items()}) for c in r) for n, r in raw["peaks"].items()},
+            {n: tuple(v) for n, v in raw["curves"].items()},
+            {n: tuple(v) for n, v in raw["before"].items()},
+            tuple(raw["instant"]),
             {n: (float(v[0]), float(v[1])) for n, v in raw["calibrated"].items()},
         )
+
+    def at_rate(self, values: tuple[float, ...], fps: float) -> float:
+        """One of the constants at a frame rate; the nearest beyond the ends."""
+        return float(np.interp(np.log(fps), np.log(self.rates), values))
+
+    def apply(self, name: str, found: Spread, fps: float) -> Band:
+        """Shift and widen."""
+        shifts, reaches = zip(*(calibration.at(found.width) for calibration in self.peaks[name]))
+        centre = found.centre + self.at_rate(shifts, fps) * found.width
+        half = self.at_rate(reaches, fps) * found.width
+        if name in RATIOS:
+            low, value, high = (float(np.exp(x)) for x in (centre - half, centre, centre + half))
+            return Band(value, low, high, high <= WIDEST_RATIO * low)
+        return Band(centre, centre - half, centre + half, 2.0 * half <= WIDEST_INSTANT_S)
+
+    def instants(self, time_s: np.ndarray, relative_alpha: np.ndarray, drawn_s: np.ndarray, fps: float) -> Band:
+        """Band of t0: the level set, its pieces with the share of the draws in each.
+
+        Parameters
+        ----------
+        time_s, relative_alpha
+            ``(g,)`` grid [s], and mean over the draws of angular acceleration over its peak.
+        drawn_s
+            ``(draws,)`` instant of each draw's peak [s].
+        fps
+            Frame rate [Hz].
+        """
+        inside = relative_alpha >= self.at_rate(self.instant, fps) * relative_alpha.max()
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+        half = 0.5 * (time_s[1] - time_s[0])
+        pieces = [(float(time_s[a] - half), float(time_s[b - 1] + half)) for a, b in edges.reshape(-1, 2)]
+        parts = tuple(Part(a, b, float(np.mean((drawn_s >= a) & (drawn_s <= b)))) for a, b in pieces)
+        likely = max(parts, key=lambda part: part.share)
+        within = drawn_s[(drawn_s >= likely.low) & (drawn_s <= likely.high)]
+        value = float(np.median(within)) if len(within) else 0.5 * (likely.low + likely.high)
+        length = sum(part.high - part.low for part in parts)
+        return Band(value, parts[0].low, parts[-1].high, length <= WIDEST_INSTANT_S, parts if len(parts) > 1 else ())
 
 
 @cache
@@ -120,9 +214,9 @@ def constants() -> Constants:
     return Constants.of(yaml.safe_load(CONSTANTS_FILE.read_text(encoding="utf-8")))
 
 
-def band(name: str, values: np.ndarray) -> Band:
-    """Calibrated band of one quantity from its draws ``(n,)``."""
-    return constants().peaks[name].apply(name, spread(name, values))
+def band(name: str, values: np.ndarray, fps: float) -> Band:
+    """Calibrated band of a peak or of the onset from its draws ``(n,)``."""
+    return constants().apply(name, spread(name, values), fps)
 
 
 UNITS = {
@@ -132,5 +226,6 @@ UNITS = {
     "a_across_m_per_s2": ("  across the line of sight", "g", STANDARD_GRAVITY),
     "a_along_m_per_s2": ("  along the line of sight", "g", STANDARD_GRAVITY),
     "t0_s": ("instant of peak angular acceleration", "ms", 1.0e-3),
+    "onset_s": ("onset of the impact", "ms", 1.0e-3),
 }
 """Words, unit and its size in SI of every quantity with a band."""
