@@ -126,9 +126,8 @@ def line(cell: Cell, rows: list[Row]) -> str:
 
 def _covered_before(rows: list[Row], kind: str) -> str:
     """Share of the components of a velocity before the impact that lie in their bands."""
-    factor = constants().at_rate(constants().before[kind], rows[0]["fps"])
     scaled = [np.abs(np.divide(r["before"][kind], r["before"][f"sigma_{kind}"])) for r in rows]
-    return f"{100 * np.mean(np.ravel(scaled) <= factor):.0f} %"
+    return f"{100 * np.mean(np.ravel(scaled) <= constants().before[kind]):.0f} %"
 
 
 def accelerations(cells: dict[str, list[Row]]) -> str:

@@ -16,8 +16,9 @@ import numpy as np
 import yaml
 from footage import Clip, View, clip_of
 from measured import Row, collect, kept_spread, rows_of
+from scipy.optimize import minimize_scalar
 
-from replay.motion.bands import BEFORE, CONSTANTS_FILE, CURVES, RATIOS
+from replay.motion.bands import BEFORE, CONSTANTS_FILE, CURVES, RATIOS, level_set
 from replay.motion.synthetic.families import BUILDING
 
 LEVEL = 0.95
@@ -58,41 +59,46 @@ def fit(paths: list[Path]) -> None:
         "families": list(BUILDING),
         "calibrated": {name: list(bounds) for name, bounds in RANGES.items()},
         "rates": rates,
-        "peaks": {name: [_fit_peak(name, some) for some in by_rate] for name in (*RATIOS, "onset_s")},
+        "peaks": {
+            **{name: [_fit_peak(name, some) for some in by_rate] for name in RATIOS},
+            # its width is in seconds, so that frame rates share their clips
+            "onset_s": [_fit_peak("onset_s", rows) for _ in rates],
+        },
         "curves": {name: [_fit_curve(name, some) for some in by_rate] for name in CURVES},
-        "before": {name: [_fit_before(name, some) for some in by_rate] for name in BEFORE},
+        "before": {name: _fit_before(name, rows) for name in BEFORE},
         "instant": [_fit_instant(some) for some in by_rate],
     }
+    content["instant_odds"] = _fit_odds(rows, dict(zip(rates, content["instant"])))
     header = (
         "# Constants of the calibrated bands; made by benchmarks/calibrate_bands.py, read by replay.motion.bands.\n"
     )
     CONSTANTS_FILE.write_text(header + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110))
 
 
-def _reach(score: np.ndarray) -> float:
-    """What 95 % of the scores do not exceed, by the conformal rank."""
+def _reach(score: np.ndarray, level: float = LEVEL) -> float:
+    """What a share of the scores does not exceed, by the conformal rank."""
     n = len(score)
-    return float(np.sort(score)[min(n - 1, int(np.ceil((n + 1) * LEVEL)) - 1)])
+    return float(np.sort(score)[min(n - 1, int(np.ceil((n + 1) * level)) - 1)])
 
 
 def _fit_peak(name: str, rows: list[Row]) -> dict[str, list[float]]:
     """Shift by the median error and widen to the conformal quantile, by thirds of the posterior's width.
 
-    The thirds tell how the error grows with the width (median and 80th percentile, which a few clips settle); all
-    clips together tell how far 95 % of the truths reach in that measure, by the conformal rank.
+    The thirds tell how the error grows with the width (median and 90th percentile, which a few clips settle); all
+    clips together tell how far 97.5 % of the truths reach to either side in that measure, by the conformal rank.
     """
+    rows = [row for row in rows if name in row["draws"]]
     found = [kept_spread(name, row) for row in rows]
     centre, width = np.array([s.centre for s in found]), np.array([s.width for s in found])
     true = np.array([row["truth"][name] for row in rows])
-    true = np.log(true) if name in RATIOS else true
+    error = ((np.log(true) if name in RATIOS else true) - centre) / width
     thirds = np.array_split(np.argsort(width), 3)
-    shift = np.array([np.median((true[third] - centre[third]) / width[third]) for third in thirds])
-    reach, score = np.empty(3), np.empty(len(true))
-    for i, third in enumerate(thirds):
-        off = np.abs((true[third] - centre[third]) / width[third] - shift[i])
-        reach[i] = np.quantile(off, 0.8)
-        score[third] = off / reach[i]
-    out = {"widths": [np.median(width[third]) for third in thirds], "shift": shift, "reach": _reach(score) * reach}
+    out = {"widths": [np.median(width[third]) for third in thirds], "shift": [np.median(error[t]) for t in thirds]}
+    for side, sign in (("below", -1.0), ("above", 1.0)):
+        off = [sign * (error[third] - middle) for third, middle in zip(thirds, out["shift"])]
+        reach = np.array([np.quantile(some, 0.9) for some in off])
+        score = np.concatenate([some / far for some, far in zip(off, reach)])
+        out[side] = list(_reach(score, 0.5 + 0.5 * LEVEL) * reach)
     return {key: [round(float(v), 6 if key == "widths" else 3) for v in values] for key, values in out.items()}
 
 
@@ -103,19 +109,33 @@ def _fit_curve(name: str, rows: list[Row]) -> float:
 
 def _fit_before(name: str, rows: list[Row]) -> float:
     """Factor for a component of a velocity before the impact."""
-    scaled = [np.divide(row["before"][name], row["before"][f"sigma_{name}"]) for row in rows]
+    scaled = [np.divide(r["before"][name], r["before"][f"sigma_{name}"]) for r in rows if "before" in r]
     return round(_reach(np.abs(np.ravel(scaled))), 3)
 
 
 def _fit_instant(rows: list[Row]) -> float:
     """Least relative acceleration, over its greatest, in which 95 % of the true t0 lie."""
-    shares = []
+    curves = [_instant(row) for row in rows]
+    return round(-_reach(-np.array([curve[at] / curve.max() for curve, at in curves])), 4)
+
+
+def _instant(row: Row) -> tuple[np.ndarray, int]:
+    """Relative acceleration on its grid, and the index of the true t0."""
+    start, step = row["t0"]["time_s"]
+    return np.array(row["t0"]["relative_alpha"]), round((row["truth"]["t0_s"] - start) / step)
+
+
+def _fit_odds(rows: list[Row], levels: dict[float, float]) -> float:
+    """Power under which the lobes that hold the true t0 are likeliest among those that compete."""
+    heights = []
     for row in rows:
-        curve = np.array(row["t0"]["relative_alpha"])
-        start, step = row["t0"]["time_s"]
-        at = round((row["truth"]["t0_s"] - start) / step)
-        shares.append(curve[at] / curve.max())
-    return round(-_reach(-np.array(shares)), 4)
+        curve, at = _instant(row)
+        pieces = level_set(curve, levels[row["fps"]])
+        tops = np.array([curve[a:b].max() for a, b in pieces])
+        heights += [tops / top for top, (a, b) in zip(tops, pieces) if len(tops) > 1 and a <= at < b]
+    # log of a lobe's chance: of h^k over the sum of all
+    fitted = minimize_scalar(lambda k: sum(np.log(np.sum(h**k)) for h in heights), bounds=(0.0, 30.0), method="bounded")
+    return round(float(fitted.x), 2)
 
 
 if __name__ == "__main__":

@@ -44,15 +44,13 @@ def collect(path: Path, seeds: range, clip_of: Callable[[int], tuple[str, Clip]]
 def measure(clip: Clip, protocol: ProtocolMotion, posterior: PosteriorMotion) -> Row:
     """Truth, draws and errors of one clip."""
     draws, frame_s = posterior.draws, 1.0 / clip.settings.fps
-    peaks = posterior.peaks
     return {
         "fps": clip.settings.fps,
         "truth": true_peaks(clip, posterior),
-        "draws": {n: _short(np.quantile(v, SHARES)) for n, v in peaks.items()},
+        "draws": {n: _short(np.quantile(v, SHARES)) for n, v in posterior.peaks.items()},
         "t0": {
             "time_s": [float(draws.inner(frame_s)[1][0]), float(draws.time_s[1] - draws.time_s[0])],
             "relative_alpha": _short(posterior.relative_alpha, 4),
-            "draws_s": _short(peaks["t0_s"], 5),
         },
         "scaled": dict(_scaled(clip, posterior)),
         "before": _before(clip, posterior),
@@ -78,7 +76,7 @@ def kept_band(name: str, row: Row) -> Band:
     if name != "t0_s":
         return constants().apply(name, kept_spread(name, row), row["fps"])
     curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
-    return constants().instants(start + step * np.arange(len(curve)), curve, np.array(row["t0"]["draws_s"]), row["fps"])
+    return constants().instants(start + step * np.arange(len(curve)), curve, row["fps"])
 
 
 def _inner_truth(clip: Clip, posterior: PosteriorMotion) -> tuple[np.ndarray, float]:

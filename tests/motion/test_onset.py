@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from replay.motion.onset import contact_index
+from replay.motion.onset import contact_index, onset_index
 from replay.motion.posterior import reconstruct_posterior
 from replay.motion.protocol import reconstruct_clicks
 from replay.motion.readout import ANGULAR, LINEAR, read_quiet
@@ -46,6 +46,19 @@ def test_the_onset_is_where_the_first_acceleration_reaches_a_tenth():
     lead = IMPACT.acceleration_lead_s + IMPACT.acceleration_duration_s * (0.5 - np.arcsin(np.sqrt(0.1)) / np.pi)
     turn = IMPACT.alpha_duration_s * (0.5 - np.arcsin(np.sqrt(0.1)) / np.pi)
     assert true_onset() == pytest.approx(-max(lead, turn), abs=1e-4)
+
+
+def test_a_forerunner_is_no_onset():
+    time = np.arange(0.0, 0.2, 1e-3)
+
+    def lobe(at, height):
+        return height * np.exp(-0.5 * ((time - at) / 0.004) ** 2)
+
+    curve = lobe(0.050, 0.3) + lobe(0.100, 0.8) + lobe(0.130, 1.0)
+    # a Gaussian of 0.8 falls to 0.1 at sqrt(2 ln 8) widths
+    assert time[onset_index(curve)] == pytest.approx(0.100 - 0.004 * np.sqrt(2 * np.log(8)), abs=1e-3)
+    assert onset_index(np.ones(5)) == 0
+    assert list(onset_index(np.stack([curve, curve[::-1]]))) == [onset_index(curve), onset_index(curve[::-1])]
 
 
 def test_the_onset_lies_in_its_band(filmed, found):

@@ -35,17 +35,17 @@ CURVES = ("omega", "alpha", "a")
 """Curves over time, whose bands are a multiple of the posterior's standard deviation."""
 BEFORE = ("velocity", "omega")
 """Velocities just before the impact, whose bands are too."""
-_LEAST = {"onset_s": 5.0e-4, "omega_rad_per_s": 0.01}
+_LEAST = {"onset_s": 2.0e-3, "omega_rad_per_s": 0.01}
 _LEAST_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class Part:
-    """One interval of a band that is not in one piece, and the share of the draws whose value lies in it."""
+    """One interval of a band that is not in one piece, and the chance that it is the one."""
 
     low: float
     high: float
-    share: float
+    chance: float
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Band:
         if not self.resolved:
             return NOT_RESOLVABLE
         if self.parts:
-            pieces = (f"{p.low / scale:{form}} to {p.high / scale:{form}} ({100 * p.share:.0f} %)" for p in self.parts)
+            pieces = (f"{p.low / scale:{form}} to {p.high / scale:{form}} ({100 * p.chance:.0f} %)" for p in self.parts)
             return " or ".join(pieces)
         value, low, high = (f"{x / scale:{form}}" for x in (self.value, *self.ends))
         return f"{value} ({low} to {high})"
@@ -118,19 +118,19 @@ class Calibration:
         Knots.
     shift
         Added to the centre, in widths.
-    reach
-        Distance of either bound from the shifted centre, in widths.
+    below, above
+        Distance of either bound from the shifted centre, in widths: frames oftener miss a peak than invent one.
     """
 
     widths: tuple[float, ...]
     shift: tuple[float, ...]
-    reach: tuple[float, ...]
+    below: tuple[float, ...]
+    above: tuple[float, ...]
 
-    def at(self, width: float) -> tuple[float, float]:
-        """Shift and reach."""
+    def at(self, width: float) -> np.ndarray:
+        """Shift, and distances below and above."""
         knots = np.log(self.widths)
-        shift, reach = (float(np.interp(np.log(width), knots, values)) for values in (self.shift, self.reach))
-        return shift, reach
+        return np.array([np.interp(np.log(width), knots, values) for values in (self.shift, self.below, self.above)])
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,10 @@ class Constants:
     peaks
         By quantity.
     curves, before
-        Multiples of the standard deviation.
-    instant
-        Least share of its greatest value that the drawn motions' mean relative acceleration has at t0.
+        Multiples of the standard deviation; those of the velocities before the impact are for all frame rates.
+    instant, instant_odds
+        Least share of its greatest value that the drawn motions' mean relative acceleration has at t0; power of it
+        that the chances of several lobes go with.
     calibrated
         Range of each fact of the footage.
     """
@@ -154,8 +155,9 @@ class Constants:
     rates: tuple[float, ...]
     peaks: dict[str, tuple[Calibration, ...]]
     curves: dict[str, tuple[float, ...]]
-    before: dict[str, tuple[float, ...]]
+    before: dict[str, float]
     instant: tuple[float, ...]
+    instant_odds: float
     calibrated: dict[str, tuple[float, float]]
 
     @classmethod
@@ -165,8 +167,9 @@ class Constants:
             tuple(raw["rates"]),
             {n: tuple(Calibration(**{k: tuple(v) for k, v in c.items()}) for c in r) for n, r in raw["peaks"].items()},
             {n: tuple(v) for n, v in raw["curves"].items()},
-            {n: tuple(v) for n, v in raw["before"].items()},
+            {n: float(v) for n, v in raw["before"].items()},
             tuple(raw["instant"]),
+            float(raw["instant_odds"]),
             {n: (float(v[0]), float(v[1])) for n, v in raw["calibrated"].items()},
         )
 
@@ -176,36 +179,46 @@ class Constants:
 
     def apply(self, name: str, found: Spread, fps: float) -> Band:
         """Shift and widen."""
-        shifts, reaches = zip(*(calibration.at(found.width) for calibration in self.peaks[name]))
-        centre = found.centre + self.at_rate(shifts, fps) * found.width
-        half = self.at_rate(reaches, fps) * found.width
+        columns = zip(*(calibration.at(found.width) for calibration in self.peaks[name]))
+        shift, below, above = (self.at_rate(values, fps) * found.width for values in columns)
+        centre = found.centre + shift
         if name in RATIOS:
-            low, value, high = (float(np.exp(x)) for x in (centre - half, centre, centre + half))
+            low, value, high = (float(np.exp(x)) for x in (centre - below, centre, centre + above))
             return Band(value, low, high, high <= WIDEST_RATIO * low)
-        return Band(centre, centre - half, centre + half, 2.0 * half <= WIDEST_INSTANT_S)
+        return Band(centre, centre - below, centre + above, below + above <= WIDEST_INSTANT_S)
 
-    def instants(self, time_s: np.ndarray, relative_alpha: np.ndarray, drawn_s: np.ndarray, fps: float) -> Band:
-        """Band of t0: the level set, its pieces with the share of the draws in each.
+    def instants(self, time_s: np.ndarray, relative_alpha: np.ndarray, fps: float) -> Band:
+        """Band of t0: the level set, and the chance of each of its pieces.
+
+        Chances go with a power of the pieces' greatest relative acceleration, the likeliest where true lobes are known.
 
         Parameters
         ----------
         time_s, relative_alpha
             ``(g,)`` grid [s], and mean over the draws of angular acceleration over its peak.
-        drawn_s
-            ``(draws,)`` instant of each draw's peak [s].
         fps
             Frame rate [Hz].
         """
-        inside = relative_alpha >= self.at_rate(self.instant, fps) * relative_alpha.max()
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-        half = 0.5 * (time_s[1] - time_s[0])
-        pieces = [(float(time_s[a] - half), float(time_s[b - 1] + half)) for a, b in edges.reshape(-1, 2)]
-        parts = tuple(Part(a, b, float(np.mean((drawn_s >= a) & (drawn_s <= b)))) for a, b in pieces)
-        likely = max(parts, key=lambda part: part.share)
-        within = drawn_s[(drawn_s >= likely.low) & (drawn_s <= likely.high)]
-        value = float(np.median(within)) if len(within) else 0.5 * (likely.low + likely.high)
-        length = sum(part.high - part.low for part in parts)
-        return Band(value, parts[0].low, parts[-1].high, length <= WIDEST_INSTANT_S, parts if len(parts) > 1 else ())
+        half = 0.5 * float(time_s[1] - time_s[0])
+        pieces = level_set(relative_alpha, self.at_rate(self.instant, fps))
+        odds = np.array([relative_alpha[a:b].max() for a, b in pieces]) ** self.instant_odds
+        parts = tuple(
+            Part(float(time_s[a]) - half, float(time_s[b - 1]) + half, float(chance))
+            for (a, b), chance in zip(pieces, odds / odds.sum())
+        )
+        return Band(
+            value=float(time_s[np.argmax(relative_alpha)]),
+            low=parts[0].low,
+            high=parts[-1].high,
+            resolved=sum(part.high - part.low for part in parts) <= WIDEST_INSTANT_S,
+            parts=parts if len(parts) > 1 else (),
+        )
+
+
+def level_set(curve: np.ndarray, share: float) -> np.ndarray:
+    """First and past-last index ``(n, 2)`` of the pieces in which a curve is above a share of its greatest."""
+    inside = np.concatenate([[0], (curve >= share * curve.max()).astype(int), [0]])
+    return np.flatnonzero(np.diff(inside)).reshape(-1, 2)
 
 
 @cache

@@ -82,7 +82,7 @@ def condition(
     return row
 
 
-def velocity_bands(before: BeforeOnset, fps: float) -> dict[str, tuple[float, float]]:
+def velocity_bands(before: BeforeOnset) -> dict[str, tuple[float, float]]:
     """95 % bands of the velocities just before the impact, by name of their column."""
     known, motion = constants(), before.motion
     out = {}
@@ -90,7 +90,7 @@ def velocity_bands(before: BeforeOnset, fps: float) -> dict[str, tuple[float, fl
         ("v", "m_per_s", "velocity", motion.velocity_m_per_s[0], before.sigma_velocity_m_per_s),
         ("omega_", "rad_per_s", "omega", motion.omega_rad_per_s[0], before.sigma_omega_rad_per_s),
     ):
-        half = known.at_rate(known.before[kind], fps) * sigma
+        half = known.before[kind] * sigma
         for i, a in enumerate("xyz"):
             out[f"{stem}{a}_{unit}"] = (float(values[i] - half[i]), float(values[i] + half[i]))
     # the spin's deviation is that along the axis

@@ -1,7 +1,8 @@
 """When the impact sets in, and how the head moved until then: what a collision starts from.
 
-The onset is the first instant at which the angular or the CG acceleration reaches a tenth of its peak. The motion at
-that instant is fitted to the frames before it alone: no pulse, whatever its shape, has a say in it.
+The onset is where the angular or the CG acceleration, whichever is first, rises from a tenth of its peak to a lobe of
+at least half of it: forerunners do not count. The motion at that instant is fitted to the frames before it alone: no
+pulse, whatever its shape, has a say in it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from replay.motion.readout import ANGULAR, LINEAR, read_quiet
 from replay.motion.settings import CameraSettings
 from replay.motion.told import Told, Turning
 
-SHARE_OF_PEAK = 0.1
-"""Of the peak acceleration, at which an impact has set in."""
+MAJOR, BEGUN = 0.5, 0.1
+"""Shares of its peak: of the first lobe that counts as the impact, and where it has begun."""
 _SURELY_BEFORE = 0.05
 
 
@@ -41,13 +42,18 @@ class BeforeOnset:
     sigma_omega_rad_per_s: np.ndarray
 
 
+def onset_index(curve: np.ndarray) -> np.ndarray:
+    """Index at which a resultant ``(..., g)`` sets in, along the last axis; 0 where it never was quiet."""
+    peak = curve.max(axis=-1, keepdims=True)
+    major = np.argmax(curve >= MAJOR * peak, axis=-1)
+    quiet = (curve < BEGUN * peak) & (np.arange(curve.shape[-1]) < major[..., None])
+    last = curve.shape[-1] - 1 - np.argmax(quiet[..., ::-1], axis=-1)
+    return np.where(quiet.any(axis=-1), last + 1, 0)
+
+
 def contact_index(alpha: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Index of the onset in resultants of angular and CG acceleration ``(..., g)``, along the last axis."""
-
-    def reached(curve: np.ndarray) -> np.ndarray:
-        return np.argmax(curve >= SHARE_OF_PEAK * curve.max(axis=-1, keepdims=True), axis=-1)
-
-    return np.minimum(reached(alpha), reached(acceleration))
+    """Index of the impact's onset in resultants of angular and CG acceleration ``(..., g)``: the first of the two."""
+    return np.minimum(onset_index(alpha), onset_index(acceleration))
 
 
 def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera: CameraSettings) -> BeforeOnset:

@@ -213,7 +213,7 @@ class Reconstruction:
             onset = self.posterior_quality.bands["onset_s"]
             if onset.resolved:
                 before = self.posterior.before
-                bands = {"time_s": onset.ends, **velocity_bands(before, self.posterior.fps)}
+                bands = {"time_s": onset.ends, **velocity_bands(before)}
                 rows.append(condition("posterior", "onset", before.motion.time_s[0], before.motion, 0, bands))
         return {name: [row[name] for row in rows] for name in INITIAL_CONDITIONS.names}
 

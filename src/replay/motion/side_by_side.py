@@ -113,7 +113,7 @@ class PosteriorQuality:
                     "value": b.value,
                     "low": b.low,
                     "high": b.high,
-                    **({"parts": [[p.low, p.high, p.share] for p in b.parts]} if b.parts else {}),
+                    **({"parts": [[p.low, p.high, p.chance] for p in b.parts]} if b.parts else {}),
                 }
                 if b.resolved
                 else NOT_RESOLVABLE
@@ -179,7 +179,7 @@ def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: Camera
 def t0_band(posterior: PosteriorMotion) -> Band:
     """Band of the instant of peak angular acceleration."""
     _, time = posterior.draws.inner(1.0 / posterior.fps)
-    return constants().instants(time, posterior.relative_alpha, posterior.peaks["t0_s"], posterior.fps)
+    return constants().instants(time, posterior.relative_alpha, posterior.fps)
 
 
 def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:

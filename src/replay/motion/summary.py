@@ -17,8 +17,8 @@ def _before(result: Reconstruction) -> list[str]:
     assert result.posterior_quality is not None
     if not result.posterior_quality.bands["onset_s"].resolved:
         return []
-    before, fps = result.posterior.before, result.posterior.fps
-    bands, lines = velocity_bands(before, fps), []
+    before = result.posterior.before
+    bands, lines = velocity_bands(before), []
     for stem, unit, words, values in (
         ("v", "m_per_s", "CG velocity before it [m/s]", before.motion.velocity_m_per_s[0]),
         ("omega_", "rad_per_s", "angular velocity before it [rad/s]", before.motion.omega_rad_per_s[0]),
