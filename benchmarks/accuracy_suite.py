@@ -19,7 +19,7 @@ import numpy as np
 from footage import RECORDS, Clip, View, clip_of
 from measured import Row, collect, kept_band, rows_of
 
-from replay.motion.bands import BEFORE, QUANTITIES, constants
+from replay.motion.bands import BEFORE, constants
 from replay.motion.synthetic.families import TESTING
 
 CLIPS = 51
@@ -77,7 +77,6 @@ HEADER = (
     "| t0, protocol [ms] | posterior [ms] | in one piece | onset [ms] | covered: omega | t0 | onset | v before "
     "| omega before | omega(t) |\n" + "|---" * 16 + "|\n"
 )
-TOLD = ("omega_rad_per_s", "t0_s", "onset_s")
 SELDOM = 0.2
 """Share of clips below which a quantity is called not resolvable in a cell."""
 
@@ -88,44 +87,60 @@ def _pair(values: Sequence[float] | np.ndarray, digits: int = 1) -> str:
 
 def line(cell: Cell, rows: list[Row]) -> str:
     """One row: errors as median / 90th percentile; coverage counts the clips whose band is no wider than allowed."""
-    told = {n: [kept_band(n, r) for r in rows] for n in QUANTITIES}
-    true = {n: np.array([r["truth"][n] for r in rows]) for n in QUANTITIES}
-    omega = np.array([b.value for b in told["omega_rad_per_s"]])
+    omega = [kept_band("omega_rad_per_s", r) for r in rows]
+    values = np.array([b.value for b in omega])
     rmse = [_pair([r[key] for r in rows]) for key in ("protocol_rmse", "rmse")]
     if cell.quiet:
-        peaks = [f"{np.median([r['protocol_omega'] for r in rows]):.1f} rad/s", f"{np.median(omega):.1f} rad/s"]
-        return (
-            f"| {cell.title} (false peak) | {peaks[0]} | {peaks[1]} | – | {rmse[0]} | {rmse[1]} |" + " – |" * 10 + "\n"
-        )
-    truth = true["omega_rad_per_s"]
-    shares = [
-        _pair(100 * np.abs(np.array([r["protocol_omega"] for r in rows]) / truth - 1)),
-        _pair(100 * np.abs(omega / truth - 1)),
-    ]
-    width = np.median([(b.high - b.low) / 2 / b.value for b in told["omega_rad_per_s"]])
-    late = {n: 1e3 * np.abs(np.array([b.value for b in told[n]]) - true[n]) for n in ("t0_s", "onset_s")}
-    t0 = [_pair(1e3 * np.abs(np.array([r["protocol_t0_s"] for r in rows]) - true["t0_s"])), _pair(late["t0_s"])]
-    single = sum(b.resolved and not b.parts for b in told["t0_s"])
-    covered = []
-    for name in TOLD:
-        resolved = [(b, x) for b, x in zip(told[name], true[name]) if b.resolved]
-        if len(resolved) < SELDOM * len(rows):
-            covered.append(f"resolved in {len(resolved)}")
-        else:
-            share = 100 * np.mean([b.covers(x) for b, x in resolved])
-            covered.append(f"{share:.0f} %" + (f" of {len(resolved)}" if len(resolved) < len(rows) else ""))
-    seen = [r for r, b in zip(rows, told["onset_s"]) if b.resolved]
-    covered += [_covered_before(seen, kind) if len(seen) >= SELDOM * len(rows) else "–" for kind in BEFORE]
+        peaks = [f"{np.median([r['protocol_omega'] for r in rows]):.1f} rad/s", f"{np.median(values):.1f} rad/s"]
+        cells = [f"{cell.title} (false peak)", *peaks, "–", *rmse, *["–"] * 10]
+        return f"| {' | '.join(cells)} |\n"
+    truth = np.array([r["truth"]["omega_rad_per_s"] for r in rows])
+    protocol = np.array([r["protocol_omega"] for r in rows])
+    protocol_t0 = [1e3 * abs(r["protocol_t0_s"] - r["truth"]["t0_s"]) for r in rows]
+    half = np.median([(b.high - b.low) / 2 / b.value for b in omega])
+    t0 = [kept_band("t0_s", r) for r in rows]
     factor = constants().at_rate(constants().curves["omega"], cell.view.fps)
     inside = np.mean(np.concatenate([r["scaled"]["omega"] for r in rows]) <= factor)
-    return (
-        f"| {cell.title} | {shares[0]} % | {shares[1]} % | ±{100 * width:.0f} % | {rmse[0]} | {rmse[1]} "
-        f"| {t0[0]} | {t0[1]} | {single} | {_pair(late['onset_s'])} | {' | '.join(covered)} | {100 * inside:.0f} % |\n"
-    )
+    cells = [
+        cell.title,
+        f"{_pair(100 * np.abs(protocol / truth - 1))} %",
+        f"{_pair(100 * np.abs(values / truth - 1))} %",
+        f"±{100 * half:.0f} %",
+        *rmse,
+        _pair(protocol_t0),
+        _late("t0_s", rows),
+        str(sum(b.resolved and not b.parts for b in t0)),
+        _late("onset_s", rows),
+        *(_covered(name, rows) for name in ("omega_rad_per_s", "t0_s", "onset_s")),
+        *(_covered_before(rows, kind) for kind in BEFORE),
+        f"{100 * inside:.0f} %",
+    ]
+    return f"| {' | '.join(cells)} |\n"
+
+
+def _late(name: str, rows: list[Row]) -> str:
+    """Errors of an instant [ms]."""
+    rows = [r for r in rows if name in r["draws"]]
+    return _pair([1e3 * abs(kept_band(name, r).value - r["truth"][name]) for r in rows]) if rows else "–"
+
+
+def _covered(name: str, rows: list[Row]) -> str:
+    """Share of the bands that hold the truth, of those that are no wider than a measurement may be."""
+    rows = [r for r in rows if name in r["draws"]]
+    resolved = [(b, r["truth"][name]) for r in rows for b in [kept_band(name, r)] if b.resolved]
+    if not rows:
+        return "–"
+    if len(resolved) < SELDOM * len(rows):
+        return f"resolved in {len(resolved)}"
+    share = 100 * np.mean([b.covers(x) for b, x in resolved])
+    return f"{share:.0f} %" + (f" of {len(resolved)}" if len(resolved) < len(rows) else "")
 
 
 def _covered_before(rows: list[Row], kind: str) -> str:
-    """Share of the components of a velocity before the impact that lie in their bands."""
+    """Share of the components of a velocity before the impact that lie in their bands, where the onset is resolved."""
+    rows = [r for r in rows if "before" in r and kept_band("onset_s", r).resolved]
+    if not rows:
+        return "–"
     scaled = [np.abs(np.divide(r["before"][kind], r["before"][f"sigma_{kind}"])) for r in rows]
     return f"{100 * np.mean(np.ravel(scaled) <= constants().before[kind]):.0f} %"
 

@@ -66,9 +66,9 @@ def fit(paths: list[Path]) -> None:
         },
         "curves": {name: [_fit_curve(name, some) for some in by_rate] for name in CURVES},
         "before": {name: _fit_before(name, rows) for name in BEFORE},
-        "instant": [_fit_instant(some) for some in by_rate],
+        "instant": (level := _fit_instant(rows)),
+        "instant_odds": _fit_odds(rows, level),
     }
-    content["instant_odds"] = _fit_odds(rows, dict(zip(rates, content["instant"])))
     header = (
         "# Constants of the calibrated bands; made by benchmarks/calibrate_bands.py, read by replay.motion.bands.\n"
     )
@@ -125,12 +125,12 @@ def _instant(row: Row) -> tuple[np.ndarray, int]:
     return np.array(row["t0"]["relative_alpha"]), round((row["truth"]["t0_s"] - start) / step)
 
 
-def _fit_odds(rows: list[Row], levels: dict[float, float]) -> float:
+def _fit_odds(rows: list[Row], level: float) -> float:
     """Power under which the lobes that hold the true t0 are likeliest among those that compete."""
     heights = []
     for row in rows:
         curve, at = _instant(row)
-        pieces = level_set(curve, levels[row["fps"]])
+        pieces = level_set(curve, level)
         tops = np.array([curve[a:b].max() for a, b in pieces])
         heights += [tops / top for top, (a, b) in zip(tops, pieces) if len(tops) > 1 and a <= at < b]
     # log of a lobe's chance: of h^k over the sum of all

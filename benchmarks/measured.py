@@ -76,7 +76,7 @@ def kept_band(name: str, row: Row) -> Band:
     if name != "t0_s":
         return constants().apply(name, kept_spread(name, row), row["fps"])
     curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
-    return constants().instants(start + step * np.arange(len(curve)), curve, row["fps"])
+    return constants().instants(start + step * np.arange(len(curve)), curve)
 
 
 def _inner_truth(clip: Clip, posterior: PosteriorMotion) -> tuple[np.ndarray, float]:

@@ -135,7 +135,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Constants:
-    """Everything in ``data/bands.yaml``: one entry a frame rate, interpolated over its logarithm.
+    """Everything in ``data/bands.yaml``; of peaks and curves one entry a frame rate, interpolated over its logarithm.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class Constants:
     peaks
         By quantity.
     curves, before
-        Multiples of the standard deviation; those of the velocities before the impact are for all frame rates.
+        Multiples of the standard deviation.
     instant, instant_odds
         Least share of its greatest value that the drawn motions' mean relative acceleration has at t0; power of it
         that the chances of several lobes go with.
@@ -156,7 +156,7 @@ class Constants:
     peaks: dict[str, tuple[Calibration, ...]]
     curves: dict[str, tuple[float, ...]]
     before: dict[str, float]
-    instant: tuple[float, ...]
+    instant: float
     instant_odds: float
     calibrated: dict[str, tuple[float, float]]
 
@@ -168,7 +168,7 @@ class Constants:
             {n: tuple(Calibration(**{k: tuple(v) for k, v in c.items()}) for c in r) for n, r in raw["peaks"].items()},
             {n: tuple(v) for n, v in raw["curves"].items()},
             {n: float(v) for n, v in raw["before"].items()},
-            tuple(raw["instant"]),
+            float(raw["instant"]),
             float(raw["instant_odds"]),
             {n: (float(v[0]), float(v[1])) for n, v in raw["calibrated"].items()},
         )
@@ -187,7 +187,7 @@ class Constants:
             return Band(value, low, high, high <= WIDEST_RATIO * low)
         return Band(centre, centre - below, centre + above, below + above <= WIDEST_INSTANT_S)
 
-    def instants(self, time_s: np.ndarray, relative_alpha: np.ndarray, fps: float) -> Band:
+    def instants(self, time_s: np.ndarray, relative_alpha: np.ndarray) -> Band:
         """Band of t0: the level set, and the chance of each of its pieces.
 
         Chances go with a power of the pieces' greatest relative acceleration, the likeliest where true lobes are known.
@@ -196,11 +196,9 @@ class Constants:
         ----------
         time_s, relative_alpha
             ``(g,)`` grid [s], and mean over the draws of angular acceleration over its peak.
-        fps
-            Frame rate [Hz].
         """
         half = 0.5 * float(time_s[1] - time_s[0])
-        pieces = level_set(relative_alpha, self.at_rate(self.instant, fps))
+        pieces = level_set(relative_alpha, self.instant)
         odds = np.array([relative_alpha[a:b].max() for a, b in pieces]) ** self.instant_odds
         parts = tuple(
             Part(float(time_s[a]) - half, float(time_s[b - 1]) + half, float(chance))

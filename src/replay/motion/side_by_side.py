@@ -179,7 +179,7 @@ def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: Camera
 def t0_band(posterior: PosteriorMotion) -> Band:
     """Band of the instant of peak angular acceleration."""
     _, time = posterior.draws.inner(1.0 / posterior.fps)
-    return constants().instants(time, posterior.relative_alpha, posterior.fps)
+    return constants().instants(time, posterior.relative_alpha)
 
 
 def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:
