@@ -11,7 +11,7 @@ from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
 from replay.models.model import Model, ModelJoint, Part, read_model, write_model
-from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
+from replay.models.parts_table import PARTS, parts_table, segments_text, summary_text, write_parts_table
 from replay.models.players import placed, second_player, together
 from replay.models.submodel import select_assembly
 
@@ -46,6 +46,7 @@ __all__ = [
     "posture_names",
     "read_model",
     "second_player",
+    "segments_text",
     "select_assembly",
     "summary_text",
     "together",

@@ -17,6 +17,8 @@ from replay.models.radial import RadialSurface
 
 #: Edge of a voxel at each resolution [m].
 STEPS_M = {"tiny": 0.040, "coarse": 0.030, "medium": 0.025, "fine": 0.020}
+#: Coarser, a limb has no inside; finer, the build takes minutes and the run no more than before.
+STEP_RANGE_M = (0.015, 0.045)
 LEAST_QUALITY = 0.30
 #: Radius about the joint within which a limb is grown to its parent, over the radius of the flesh there [m].
 _GROWN_M = {
@@ -221,8 +223,8 @@ def _bones(
 ) -> np.ndarray:
     """Hexes of bone: a segment's whole length, but no node of another bone.
 
-    Whoever chooses first takes what touches its neighbours, and leaves them a layer of flesh at the joint: hands and
-    feet, so that they are not left without, then from the trunk outwards. Only the neck keeps a layer at both ends.
+    Whoever chooses first takes what touches its neighbours, and leaves them a layer of flesh at the joint: neck, hands
+    and feet, so that they are not left without, then from the trunk outwards.
     """
     centre = nodes[hexes].mean(axis=1)
     owner = np.full(len(nodes), -1)
@@ -237,9 +239,7 @@ def _bones(
         distance, _ = cKDTree(_dense(posed.ends[name], 0.004)).query(centre[own])
         free = np.isin(owner[hexes[own]], [-1, k]).all(axis=1)
         chosen = free if tissue == "rigid" else free & (distance <= _BONE_RADIUS_M)
-        if name == "neck":
-            chosen = chosen & ~np.isin(hexes[own], hexes[segment != k]).any(axis=1)
-        if free.any() and not chosen.any():  # a limb thinner than its voxels, a neck of three layers: its middle alone
+        if free.any() and not chosen.any():  # a limb thinner than its voxels: its middle alone
             away = np.sqrt(np.sum((centre[own] - posed.ends[name].mean(axis=0)) ** 2, axis=1))
             chosen = free & (away <= away[free].min() + 1e-9)
         bone[own[chosen]] = True

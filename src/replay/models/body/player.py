@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.models.body.mesh import STEPS_M, BodyMesh, HeadRoom, body_mesh
+from replay.models.body.mesh import STEP_RANGE_M, STEPS_M, BodyMesh, HeadRoom, body_mesh
 from replay.models.body.posture import BodyJoint, PosedBody, Posture, body_joints, named_posture, pose
 from replay.models.body.segments import HEAD, MESHED, de_leva_masses_kg, target_masses_kg
 from replay.models.body.shape import load_body, shape_of
@@ -85,6 +85,9 @@ def with_body(model: Model, plan: BodyPlan = BodyPlan()) -> Model:
     shape = shape_of(plan.stature_m, plan.mass_kg, plan.muscle)
     posed = pose(shape, posture)
     step = STEPS_M[model.info["resolution"]] if plan.step_m is None else plan.step_m
+    if not STEP_RANGE_M[0] <= step <= STEP_RANGE_M[1]:
+        message = f"voxels of {step:g} m; between {STEP_RANGE_M[0]:g} and {STEP_RANGE_M[1]:g} m is possible"
+        raise ValueError(message)
     seat = _Seat.of(model, posed)
     mesh = body_mesh(shape, posed, step, seat.room(model), plan.tissue)
     missing = [name for k, name in enumerate(MESHED) if not mesh.bone[mesh.segment == k].any()]
