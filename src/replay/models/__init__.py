@@ -8,6 +8,7 @@ from replay.models.build import build_model
 from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
+from replay.models.membranes import CableNet, falx, tentorium
 from replay.models.model import Model, Part, read_model, write_model
 from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
 from replay.models.submodel import select_assembly
@@ -22,6 +23,7 @@ def write_preview(path: str | Path, model: Model) -> None:
 
 __all__ = [
     "PARTS",
+    "CableNet",
     "HelmetDesign",
     "Model",
     "Part",
@@ -31,6 +33,7 @@ __all__ = [
     "brain_parameters",
     "brain_sets",
     "build_model",
+    "falx",
     "helmet_inspection",
     "load_design",
     "load_materials",
@@ -39,6 +42,7 @@ __all__ = [
     "read_model",
     "select_assembly",
     "summary_text",
+    "tentorium",
     "write_model",
     "write_parts_table",
     "write_preview",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from replay import models
 from replay.models import Model, select_assembly
 from replay.motion import Kinematics
 from replay.play import Contact, Play
@@ -107,6 +108,17 @@ def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
     return shell, tuple(straps)
 
 
+def membrane_cables(model: Model) -> tuple[Strap, ...]:
+    """Falx and tentorium of a model that has them, cable by cable."""
+    if model.info.get("membranes", "none") == "none":
+        return ()
+    return tuple(
+        Strap(f"{name}_{k}", ends.astype(np.int64), stiffness, recorded=False)
+        for name, net in (("falx", models.falx(model)), ("tentorium", models.tentorium(model)))
+        for k, (ends, stiffness) in enumerate(zip(net.nodes, net.stiffness_n_per_m.tolist()))
+    )
+
+
 def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact: Contact) -> Problem:
     """Head and helmet with the skull driven along the play's motion.
 
@@ -147,7 +159,7 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         node_ids=model.node_ids,
         element_ids=model.element_ids,
         rigid_sets=shell,
-        straps=straps,
+        straps=(*straps, *membrane_cables(model)),
         contact=contact_of(model, contact),
     )
 
