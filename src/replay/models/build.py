@@ -66,7 +66,6 @@ def build_model(
     *,
     helmet: bool = True,
     design: HelmetDesign | None = None,
-    player: int = 1,
     helmet_structure: str = "rigid",
     brain: str = "brain_isv",
     membranes: str = "none",
@@ -86,8 +85,6 @@ def build_model(
         False for a bare head.
     design
         The helmet of `load_design`; the classic one where None.
-    player
-        1 or 2: whose blocks of numbers head and helmet take.
     helmet_structure
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
     brain
@@ -105,7 +102,7 @@ def build_model(
     Raises
     ------
     ValueError
-        For an unknown preset, resolution, structure, membranes, seat or player, or a mass that is not positive.
+        For an unknown preset, resolution, structure, membranes or seat, or a mass that is not positive.
     """
     if helmet_structure not in STRUCTURE_NOTES:
         message = f"no helmet structure {helmet_structure!r}; there are {', '.join(STRUCTURE_NOTES)}"
@@ -119,11 +116,8 @@ def build_model(
     if resolution not in RESOLUTIONS:
         message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
         raise ValueError(message)
-    if player not in PLAYERS:
-        message = f"no player {player!r}; there are {', '.join(map(str, PLAYERS))}"
-        raise ValueError(message)
     worn = (design or load_design()) if helmet else None
-    head, blocks = head_preset(preset, RESOLUTIONS[resolution].divisions), PLAYERS[player]
+    head, blocks = head_preset(preset, RESOLUTIONS[resolution].divisions), PLAYERS[1]
     target = worn.mass_kg * head.helmet_size if worn and helmet_mass_kg is None else helmet_mass_kg
     if target is not None and not target > 0:
         message = f"a helmet of {target} kg"
@@ -169,7 +163,7 @@ def build_model(
             "preset": preset,
             "preset_title": head.title,
             "resolution": resolution,
-            "player": player,
+            "player": 1,
             "star_centre_m": [float(v) for v in -cg],
             "tragion_m": [float(v) for v in np.array(head.surfaces.tragion_m) - cg],
             "atlas_centre_mm": list(head.surfaces.atlas_centre_mm),

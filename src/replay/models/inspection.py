@@ -171,8 +171,8 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    blocks = {name: blocks_of(model).of(name) for name in ("head", "helmet")}
-    outside = [p.name for p in model.parts if not blocks[p.assembly][0] < p.pid <= blocks[p.assembly][1]]
+    blocks = {part: blocks_of(model).of(part.assembly) for part in model.parts}
+    outside = [part.name for part, (first, last) in blocks.items() if not first < part.pid <= last]
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from replay import models
@@ -12,6 +14,7 @@ from replay.solver import (
     ContactControls,
     ContactPair,
     Controls,
+    Joint,
     Material,
     PrescribedMotion,
     Problem,
@@ -119,6 +122,19 @@ def membrane_cables(model: Model) -> tuple[Strap, ...]:
     )
 
 
+def body_links(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Joint, ...]]:
+    """Node sets that move as bodies, and joints, of a model with a body; none of a bare head."""
+    sets = tuple(RigidSet(name, model.node_sets[name].astype(np.int64)) for name in model.rigid_node_sets)
+    joints = tuple(
+        Joint(
+            j.name, j.first, j.second, np.array(j.centre_m), np.array(j.stiffness_n_m_per_rad), j.damping_ratio,
+            j.centre_stiffness_n_per_m, j.centre_damping_ratio, np.array(j.axes),
+        )
+        for j in model.joints
+    )  # fmt: skip
+    return sets, joints
+
+
 def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact: Contact) -> Problem:
     """Head and helmet with the skull driven along the play's motion.
 
@@ -137,8 +153,12 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         The play's ``solver.contact`` block.
     """
     shell, straps = chin_straps(model)
+    parts, (bodies, joints) = solver_parts(model), body_links(model)
     arms = driver.rotation[0].apply(model.nodes)
-    parts = solver_parts(model)
+    turn = driver.rotation[0].as_matrix()
+    joints = tuple(
+        dataclasses.replace(j, centre=driver.position_m[0] + turn @ j.centre, axes=j.axes @ turn.T) for j in joints
+    )
     return Problem(
         nodes=driver.position_m[0] + arms,
         hexes=model.hexes,
@@ -158,7 +178,8 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
-        rigid_sets=shell,
+        rigid_sets=(*shell, *bodies),
+        joints=joints,
         straps=(*straps, *membrane_cables(model)),
         contact=contact_of(model, contact),
     )
@@ -210,7 +231,7 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls, conta
 
 
 def solver_parts(model: Model) -> tuple[SolverPart, ...]:
-    """Parts of a head and helmet model with their materials."""
+    """Parts of a model with their materials."""
     parts = []
     for part in model.parts:
         facts = model.materials[part.material]
