@@ -7,6 +7,7 @@ from pathlib import Path
 from replay.models.body.player import BodyPlan, with_body
 from replay.models.body.posture import Posture, posture_names
 from replay.models.build import build_model
+from replay.models.comparison import comparison_text
 from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
@@ -39,6 +40,7 @@ __all__ = [
     "brain_parameters",
     "brain_sets",
     "build_model",
+    "comparison_text",
     "falx",
     "helmet_inspection",
     "load_design",

@@ -163,6 +163,7 @@ def write_model_file(
     model = models.build_model(preset, resolution, design=models.load_design(helmet or "classic", *others))
     models.write_model(out, model)
     print(models.summary_text(model))
+    print(models.comparison_text(model))
     if preview is not None:
         models.write_preview(preview, model)
     return 0
