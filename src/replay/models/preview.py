@@ -60,6 +60,9 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
         _paint(axes, model, shown, azimuth, elevation)
         axes.set_title(title, fontsize=11, color="#333333")
     name = f"{model.info.get('preset', 'model')}, {model.info.get('resolution', '')}"
+    chosen = model.info.get("helmet", {}).get("chosen")
+    if chosen:
+        name += f", helmet {chosen['helmet']}, facemask {chosen['facemask']}"
     figure.suptitle(f"{name}: {len(model.hexes):,} hexahedra, {len(model.nodes):,} nodes", fontsize=14, y=0.975)
     looks = {_look(part) for part in model.parts}
     present = [look for look in _COLOURS if look in looks]

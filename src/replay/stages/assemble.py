@@ -37,6 +37,7 @@ def run(workspace: Workspace) -> str | None:
         design=models.load_design(*play.model.helmet_pieces, folder=play.folder),
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
+        membranes=play.model.membranes,
         seat=play.model.helmet_seat,
     )
     contact = None

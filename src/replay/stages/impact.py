@@ -90,7 +90,7 @@ def run_solver(
     """Run a problem in the stage's folder and list its files; a run that stops itself ends the play."""
     if problem.contact is not None:
         files = files | CONTACT_FILES
-    if problem.straps:
+    if any(strap.recorded for strap in problem.straps):
         files = files | STRAP_FILES
     folder = stage.write_all(files)
     try:

@@ -54,6 +54,13 @@ _BRAIN = {
     ),
     "viscohyperelastic": "Damage. The play asks for a visco-elastic brain, which keeps no damage variable.",
 }
+_MEMBRANES = {
+    "none": (
+        "What falx and tentorium do: they are left out. In the demo they lower the strain of the occipital lobes by 16"
+        " to 21 % and raise that of the corpus callosum by 7 %; `model.membranes: cables` puts them in."
+    ),
+    "cables": "Bending of falx and tentorium: they are nets of cables, which pull alone.",
+}
 _STRUCTURE = {
     "rigid": (
         "Deformation of shell and facemask. They move as one rigid body: at this resolution one element across a"
@@ -101,6 +108,7 @@ def collect(stage: Stage) -> ReportInput:
             _SEAT[play.model.helmet_seat],
             _DRIVEN,
             _BRAIN[play.model.brain_material],
+            _MEMBRANES[play.model.membranes],
             _STRUCTURE[play.model.helmet_structure],
             *quality["warnings"],
         ],

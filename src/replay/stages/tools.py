@@ -184,6 +184,7 @@ def write_model_file(
         model = add_body(model, facts.pop("posture"), models.BodyPlan(**facts))
     models.write_model(out, model)
     print(models.summary_text(model))
+    print(models.comparison_text(model))
     if body is not None:
         print("\n" + models.segments_text(model))
     if preview is not None:
