@@ -25,6 +25,10 @@ BONE_PIDS, FLESH_PIDS = 60_000_100, 60_000_200
 _FIRST_NUMBER = 65_000_000
 SKULL_SET = "skull_base"
 TISSUES = ("rigid", "deformable")
+NOTES = {
+    "rigid": "the body's segments are rigid and held by joints alone; decks do not carry the joints",
+    "deformable": "the body is flesh about thin rigid bones, held by joints; decks do not carry the joints",
+}
 
 
 @dataclass(frozen=True)
@@ -236,5 +240,5 @@ def _merged(
         node_sets={**model.node_sets, **carried},
         joints=joints,
         rigid_node_sets=tuple(carried),
-        info={**model.info, "body": body},
+        info={**model.info, "body": body, "notes": [*model.info["notes"], NOTES[body["tissue"]]]},
     )
