@@ -124,6 +124,11 @@ class Model:
     info: dict[str, Any]
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)
 
+    @property
+    def has_damage(self) -> bool:
+        """Whether the brain's law keeps the damage variable."""
+        return bool(self.materials["brain"]["law"] == "brain_isv")
+
     def part_index(self, name: str) -> int:
         """Index of the part of this name.
 
