@@ -131,11 +131,30 @@ def _parser() -> argparse.ArgumentParser:
     )
     digitize.add_argument("--patch", type=_positive, default=21, metavar="PX", help="side of the patch (default 21)")
 
-    model = commands.add_parser("model", help="build a head and helmet model by itself")
+    model = commands.add_parser("model", help="build a head and helmet model by itself, with --body a whole player")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
     model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse", "medium", "fine"])
+    for piece, text in (
+        ("helmet", "classic, modern"),
+        ("facemask", "classic, modern, open, none"),
+        ("pads", "classic, modern"),
+        ("chinstrap", "low, high, two_point"),
+    ):
+        model.add_argument(
+            f"--{piece}",
+            metavar="NAME",
+            help=f"{text}, or a YAML file (default: the helmet's)",
+        )
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
+    model.add_argument("--body", metavar="POSTURE", help="a body in this posture, by name or YAML file of joint angles")
+    model.add_argument("--stature", type=_above_0, default=1.85, metavar="M", help="of the body (default 1.85)")
+    model.add_argument("--mass", type=_above_0, default=110.0, metavar="KG", help="without helmet (default 110)")
+    model.add_argument("--muscle", type=_above_0, default=0.9, help="0.5 average, 1 most (default 0.9)")
+    model.add_argument(
+        "--tissue", choices=["rigid", "deformable"], default="rigid", help="flesh of the body's segments"
+    )
+    model.add_argument("--voxel", type=_above_0, metavar="M", help="edge of the body's hexes")
 
     solve = commands.add_parser(
         "solve",
@@ -314,6 +333,16 @@ def _run_helmet(arguments: argparse.Namespace) -> int:
     return helmet.prepare(arguments.files, helmet=arguments.helmet, out=arguments.out, **given)
 
 
+def _body(arguments: argparse.Namespace) -> dict[str, Any] | None:
+    """What `replay model` is told of a body; none without ``--body``."""
+    if arguments.body is None:
+        return None
+    return {
+        "posture": arguments.body, "stature_m": arguments.stature, "mass_kg": arguments.mass,
+        "muscle": arguments.muscle, "tissue": arguments.tissue, "step_m": arguments.voxel,
+    }  # fmt: skip
+
+
 def _run_tool(arguments: argparse.Namespace) -> int:
     from replay.stages import explicit, laboratory, tools
 
@@ -333,7 +362,12 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             arguments.patch,
         ),
         "model": lambda: tools.write_model_file(
-            arguments.preset, arguments.resolution, arguments.out, arguments.preview
+            arguments.preset,
+            arguments.resolution,
+            (arguments.helmet, arguments.facemask, arguments.pads, arguments.chinstrap),
+            arguments.out,
+            arguments.preview,
+            _body(arguments),
         ),
         "solve": lambda: explicit.solve_model(
             arguments.model,

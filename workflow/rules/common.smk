@@ -27,6 +27,7 @@ PLAY = "[a-z0-9_-]+"
 CHECKPOINT_S = int(config.get("checkpoint_every_s") or 10)
 WRITTEN_OUT = "results/plays.d"
 TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
+PIECES = ("helmet", "facemask", "pads", "chinstrap")
 _held = []
 
 
@@ -70,9 +71,11 @@ def said(play):
 
 
 def play_files(wildcards):
-    """The tracks that the play's description names."""
-    source = said(wildcards.play).get("source")
-    names = [source.get(key) for key in TRACKS] if isinstance(source, dict) else []
+    """The tracks, and the pieces of a helmet, that the play's description names."""
+    names = []
+    for block, keys in (("source", TRACKS), ("model", PIECES)):
+        given = said(wildcards.play).get(block)
+        names += [given.get(key) for key in keys] if isinstance(given, dict) else []
     folder = base_of(wildcards.play)
     return [
         (folder / name).as_posix()

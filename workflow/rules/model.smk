@@ -4,6 +4,7 @@
 rule assemble:
     input:
         settings=stage("settings"),
+        inputs=of("inputs"),
         code=code("assemble"),
     output:
         stage("assembly"),

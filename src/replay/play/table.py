@@ -173,8 +173,10 @@ def write_out(row: Row, plays: Path, into: Path) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for path in (*play.files, *(play.file(name) for name in play.withhold)):
         _link(path, folder / path.name)
-    names = {key: Path(value).name for key, value in data["source"].items() if value in play.source.files}
-    written = {**data, "name": row.play, "source": {**data["source"], **names}}
+    written = {**data, "name": row.play}
+    for block, files in (("source", play.source.files), ("model", play.model.files)):
+        if block in data:
+            written[block] = {key: Path(v).name if v in files else v for key, v in data[block].items()}
     changes = ", ".join(f"{path} = {value}" for path, value in row.overrides.items()) or "nothing changed"
     text = f"# The play {row.base} with {changes}; written from {row.file.name}, change it there.\n"
     target = folder / "play.yaml"

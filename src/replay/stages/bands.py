@@ -14,7 +14,7 @@ from replay.play import ADDRESS, Member, members_of, read_ensemble
 from replay.report import ensemble_page
 from replay.stages.frame import Finished, Stage, Workspace
 from replay.stages.limits import limits_of
-from replay.stages.settings import ensemble_file
+from replay.stages.resolved import ensemble_file
 from replay.tables import Column, TableFormat
 
 BANDS = TableFormat(

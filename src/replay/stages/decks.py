@@ -11,7 +11,7 @@ from replay.play import Play, estimate
 from replay.stages.frame import Stage, Workspace
 from replay.stages.own_deck import model_facts, node_sets, region_sets
 from replay.stages.problem import chin_straps, seated_by_contact
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.
 _HOURGLASS_METHODS = {"stiffness": 4, "selective": 4, "viscous": 1}

@@ -7,7 +7,7 @@ from dataclasses import replace
 from replay.files import read_json
 from replay.motion import Kinematics, build_driver
 from replay.stages.frame import Stage, Workspace
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 
 def run(workspace: Workspace) -> str | None:

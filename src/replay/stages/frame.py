@@ -77,6 +77,10 @@ class Finished:
         self._before: dict[str, StageManifest] = {stage: check_stage(workspace, stage) for stage in stages}
         self._inputs: dict[str, Path] = {}
 
+    def follow(self, stage: str) -> None:
+        """Let this stage read one more stage's files, which only an earlier one's show to be needed."""
+        self._before.setdefault(stage, check_stage(self.workspace, stage))
+
     @property
     def stopped_by(self) -> str | None:
         """Why an earlier stage ended the play, or None."""

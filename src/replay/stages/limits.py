@@ -7,7 +7,7 @@ from typing import Any
 
 from replay.gates import Limits
 from replay.stages.frame import Finished
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 
 def limits_of(stage: Finished) -> Limits:

@@ -9,7 +9,7 @@ from replay.gates import video_reconstruction_gate, wearable_reconstruction_gate
 from replay.motion import reconstruct
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 _MEANINGS = {
     "kinematics.csv": "motion of the skull's centre of gravity; from clicks, both modes with bands",

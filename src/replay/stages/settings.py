@@ -11,11 +11,10 @@ from replay.documents import check_settings
 from replay.errors import InputError
 from replay.files import read_json, write_json
 from replay.gates import Limits
+from replay.models import load_design
 from replay.play import ADDRESS, ModelChoice, Play, load_play, members_of, overridden, read_ensemble
-from replay.play.ensemble import ENDING
-from replay.stages.frame import MEMBER, Finished, Stage, Workspace, check_stage
-
-FILE = "play.json"
+from replay.stages.frame import MEMBER, Stage, Workspace, check_stage
+from replay.stages.resolved import FILE, ensemble_file
 
 
 def run(workspace: Workspace, *, resolution: str | None = None, ensemble: Path | None = None) -> str | None:
@@ -35,25 +34,23 @@ def run(workspace: Workspace, *, resolution: str | None = None, ensemble: Path |
     play = load_play(workspace.description)
     Limits.load(play.gates, file=workspace.description)
     if resolution:
-        model = ModelChoice.model_validate({**play.model.model_dump(), "resolution": resolution})
-        play = play.model_copy(update={"model": model})
+        choice = ModelChoice.model_validate({**play.model.model_dump(), "resolution": resolution})
+        play = play.model_copy(update={"model": choice})
+    load_design(*play.model.helmet_pieces, folder=play.folder)
     stage = Stage(workspace, "settings")
     stage.read_file("play.yaml", workspace.description)
     source = {
         key: Path(value).name if value in play.source.files else value
         for key, value in play.source.model_dump(mode="json").items()
     }
-    resolved = {**play.model_dump(mode="json"), "source": source}
+    model = {
+        key: Path(value).name if value in play.model.files else value
+        for key, value in play.model.model_dump(mode="json").items()
+    }
+    resolved = {**play.model_dump(mode="json"), "source": source, "model": model}
     write_json(stage.write(FILE, "the play with every default spelled out"), resolved)
     print(f"{play.name}: {play.title or 'no title'} ({play.source.kind}, {play.model.resolution})")
     return stage.finish()
-
-
-def ensemble_file(workspace: Workspace) -> Path:
-    """Description of the ensemble that the workspace's address names: beside the play it is of."""
-    match = ADDRESS.fullmatch(workspace.play)
-    assert match
-    return workspace.plays / match["play"] / f"{match['ensemble']}{ENDING}"
 
 
 def _run_member(workspace: Workspace, file: Path) -> str | None:
@@ -77,9 +74,3 @@ def _run_member(workspace: Workspace, file: Path) -> str | None:
     )
     print(f"{member.address}: " + ", ".join(f"{path} = {value}" for path, value in member.varied.items()))
     return stage.finish()
-
-
-def read_settings(stage: Finished) -> Play:
-    """Settings of the play for a later stage; the tracks it names lie in the folder of stage ``inputs``."""
-    play = Play.model_validate(read_json(stage.read("settings", FILE)))
-    return play.lying_in(stage.workspace.folder("inputs"))

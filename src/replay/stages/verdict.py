@@ -10,7 +10,7 @@ from replay.gates import Gate, PlayVerdict, package_gate, play_verdict, read_gat
 from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 GATE_FILES = {
     "reconstruction": ("gate.json",),
