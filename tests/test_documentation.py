@@ -59,8 +59,9 @@ something to say.
 
 `states.vtkhdf` is a temporal VTKHDF unstructured grid (ParaView 5.12 and later); `states.xdmf` names the same data
 for VisIt. `model.h5` holds the mesh as HDF5 datasets (`nodes/coordinates_m`, `elements/connectivity`, ...) and one
-JSON document with parts, sets, materials and notes; of a player with a body also his joints (numbers of two rigid parts, centre,
-axes in rows, stiffness for positive and negative angles, damping ratios) and the names of node sets that move as one body.
+JSON document with parts, sets, materials and notes; of a player with a body also his joints (numbers of two rigid
+parts, centre, axes in rows, stiffness for positive and negative angles, damping ratios) and the names of node sets that
+move as one body.
 
 ## Tables
 """
