@@ -1,4 +1,4 @@
-"""Falx and tentorium as nets of cables: the stiffness of a sheet, where the anatomy has them."""
+"""Falx and tentorium as nets of cables with the stiffness of a sheet, and the outlet below the brainstem."""
 
 from __future__ import annotations
 
@@ -72,3 +72,23 @@ def test_cables_are_in_the_problem_only_where_the_play_asks_for_them(tiny: Model
     np.testing.assert_array_equal(model.nodes, tiny.nodes)
     with pytest.raises(ValueError, match="no membranes 'steel'"):
         build_model("nfl", "tiny", membranes="steel")
+
+
+@pytest.mark.parametrize("resolution", ["tiny", "coarse"])
+def test_the_foramen_magnum_is_fluid_from_the_brainstem_to_the_neck(resolution: str) -> None:
+    closed, opened = (build_model("nfl", resolution, helmet=False, outlet=outlet) for outlet in ("closed", "open"))
+    np.testing.assert_allclose(np.ptp(opened.nodes, axis=0), np.ptp(closed.nodes, axis=0), atol=1e-12)
+    assert opened.elements_of(role="csf").sum() - closed.elements_of(role="csf").sum() == (
+        closed.elements_of(role="skull").sum() - opened.elements_of(role="skull").sum()
+    )
+    skull, fluid = (np.unique(opened.hexes[opened.elements_of(role=role)]) for role in ("skull", "csf"))
+    neck = np.unique(
+        np.concatenate([opened.hexes[opened.elements_of(role=role)].ravel() for role in ("scalp", "face")])
+    )
+    window = opened.nodes[np.setdiff1d(np.intersect1d(fluid, neck), skull)]
+    assert len(window)  # fluid that touches the neck's flesh and no bone
+    rim = opened.nodes[np.intersect1d(np.intersect1d(fluid, neck), skull)]
+    assert 0.025 < np.ptp(rim[:, 1]) < 0.060
+    assert (rim[:, 2] < -0.04).all()
+    with pytest.raises(ValueError, match="no outlet 'ajar'"):
+        build_model("nfl", "tiny", outlet="ajar")

@@ -73,6 +73,10 @@ class ModelChoice(Setting):
         default="none",
         description="Falx and tentorium: `none`, or `cables`, sheets of dura as nets of cables that only pull.",
     )
+    outlet: Literal["closed", "open"] = Field(
+        default="closed",
+        description="Skull below the brainstem: `closed`, or `open` with fluid in the foramen magnum.",
+    )
     helmet: HelmetPiece = Field(
         default="classic",
         description="Helmet: `classic` in the article's proportions, `modern` thicker and heavier, or a YAML file "

@@ -38,6 +38,7 @@ def run(workspace: Workspace) -> str | None:
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
         membranes=play.model.membranes,
+        outlet=play.model.outlet,
         seat=play.model.helmet_seat,
     )
     contact = None
