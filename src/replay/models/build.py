@@ -28,8 +28,12 @@ NOTES = (
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
     "brain and scalp are an average of many people's anatomy; the skull between them is a rule, not a measured bone",
     "sulci and ventricles are meshed as grey matter: the fluid of the article is stiffer in shear than brain",
-    "falx and tentorium are left out",
+    "the skull is closed below the brainstem: its outlet would leave strain as it is and raise tension",
 )
+MEMBRANE_NOTES = {
+    "none": "falx and tentorium are left out",
+    "cables": "falx and tentorium are nets of cables in the replay; decks do not hold them",
+}
 SEAT_NOTES = {
     "shared_nodes": (
         "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
@@ -64,6 +68,7 @@ def build_model(
     design: HelmetDesign | None = None,
     helmet_structure: str = "rigid",
     brain: str = "brain_isv",
+    membranes: str = "none",
     seat: str = "shared_nodes",
 ) -> Model:
     """Build head and helmet.
@@ -84,6 +89,8 @@ def build_model(
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
     brain
         Law of the brain: ``brain_isv`` or ``viscohyperelastic``.
+    membranes
+        Falx and tentorium: ``none``, or ``cables`` (see `replay.models.membranes`).
     seat
         ``shared_nodes``: pads and chin cup share the scalp's nodes; ``contact``: they touch it, held by chin straps.
 
@@ -95,10 +102,13 @@ def build_model(
     Raises
     ------
     ValueError
-        For an unknown preset, resolution, structure or seat, or a mass that is not positive.
+        For an unknown preset, resolution, structure, membranes or seat, or a mass that is not positive.
     """
     if helmet_structure not in STRUCTURE_NOTES:
         message = f"no helmet structure {helmet_structure!r}; there are {', '.join(STRUCTURE_NOTES)}"
+        raise ValueError(message)
+    if membranes not in MEMBRANE_NOTES:
+        message = f"no membranes {membranes!r}; there are {', '.join(MEMBRANE_NOTES)}"
         raise ValueError(message)
     if seat not in SEAT_NOTES:
         message = f"no helmet seat {seat!r}; there are {', '.join(SEAT_NOTES)}"
@@ -165,7 +175,13 @@ def build_model(
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
             "helmet_structure": helmet_structure if helmet else None,
             "helmet_seat": seat if helmet else None,
-            "notes": [*SEAT_NOTES[seat], *NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
+            "membranes": membranes,
+            "notes": [
+                *(SEAT_NOTES[seat] if worn else ()),
+                *NOTES,
+                MEMBRANE_NOTES[membranes],
+                *((STRUCTURE_NOTES[helmet_structure],) if worn else ()),
+            ],
             **_record(worn, seat),
         },
     )
