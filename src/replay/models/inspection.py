@@ -6,14 +6,27 @@ from typing import Any
 
 import numpy as np
 
-from replay.models.build import PID_BLOCKS
 from replay.models.mass import Datum, MassProperties, mass_properties, three_point_datum
 from replay.models.model import Model
+from replay.models.numbering import PLAYERS, Blocks
 from replay.models.quality import hex_volumes, scaled_jacobians
 
-PAD_SETS = ("H1_pads_set1", "H1_pads_set2")
-FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), (60009020, "chin_cup", 2))
-"""Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
+SKIN = 9020
+"""Part number of the skin within a head's block."""
+_MOUNTS = ("brow", "side_high", "side_low")
+_STRAPS = ("front", "rear")
+
+
+def blocks_of(model: Model) -> Blocks:
+    """Blocks of numbers of the player whose head and helmet a model is."""
+    return PLAYERS[model.info.get("player", 1)]
+
+
+def friction_pairs(model: Model) -> tuple[tuple[int, str, int], ...]:
+    """Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
+    blocks = blocks_of(model)
+    skin, (comfort, energy) = blocks.head + SKIN, blocks.pad_sets
+    return (skin, comfort, 1), (skin, energy, 1), (skin, "chin_cup", 2)
 
 
 def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
@@ -50,9 +63,9 @@ def helmet_datum(model: Model) -> Datum:
 
 
 def mass_report(model: Model) -> dict[str, Any]:
-    """Mass, centre of gravity and inertia of head, helmet and parts; the helmet's CG in its datum (step 1.3)."""
+    """Mass, centre of gravity and inertia of head, helmet, body and parts; the helmet's CG in its datum (step 1.3)."""
     report: dict[str, Any] = {"units": "kg, m, kg m^2; head frame", "assemblies": {}, "parts": {}}
-    for assembly in ("head", "helmet"):
+    for assembly in ("head", "helmet", "body"):
         if model.elements_of(assembly=assembly).any():
             report["assemblies"][assembly] = _as_dict(assembly_mass(model, assembly))
     for part in model.parts:
@@ -116,7 +129,7 @@ def helmet_inspection(model: Model, *, helmet_cg_in_datum_m: np.ndarray | None =
 
 def missing_interfaces(model: Model) -> list[str]:
     """Name every interface of the article's step 1.5 that the model lacks: pads, pad-pad, mounts, strap anchors."""
-    missing = [name for name in PAD_SETS if not model.part_sets.get(name)]
+    missing = [name for name in blocks_of(model).pad_sets if not model.part_sets.get(name)]
     names = {part.name: k for k, part in enumerate(model.parts)}
     for name, k in names.items():
         if name.startswith("comfort_pad_"):
@@ -125,13 +138,15 @@ def missing_interfaces(model: Model) -> list[str]:
                 missing.append(f"pad-pad {name}")
         elif name.startswith("energy_pad_") and ("shell" not in names or not len(_shared(model, k, names["shell"]))):
             missing.append(f"pad-shell {name}")
-    for place in ("brow", "side_high", "side_low"):
+    worn = model.info.get("helmet", {})
+    mask, strap = worn.get("facemask", {"mounts": _MOUNTS}), worn.get("chinstrap", {"straps": _STRAPS})
+    for place in mask["mounts"] if mask else ():
         missing += [
             f"facemask mount {place} {side}"
             for side in ("left", "right")
             if not len(model.node_sets.get(f"facemask_mount_{place}_{side}", ()))
         ]
-    for anchor in ("strap_anchor_front", "strap_anchor_rear", "chin_cup_strap"):
+    for anchor in (*(f"strap_anchor_{name}" for name in strap["straps"]), "chin_cup_strap"):
         missing += [
             f"{anchor} {side}" for side in ("left", "right") if not len(model.node_sets.get(f"{anchor}_{side}", ()))
         ]
@@ -156,13 +171,12 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    outside = [
-        part.name for part in model.parts if not PID_BLOCKS[part.assembly][0] < part.pid <= PID_BLOCKS[part.assembly][1]
-    ]
+    blocks = {part: blocks_of(model).of(part.assembly) for part in model.parts}
+    outside = [part.name for part, (first, last) in blocks.items() if not first < part.pid <= last]
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"
-        for pid, other, _ in FRICTION_PAIRS
+        for pid, other, _ in friction_pairs(model)
         if pid not in pids or not (model.part_sets.get(other) or other in {part.name for part in model.parts})
     ]
     mass: float | str = "no mass of the physical helmet is given"
@@ -186,7 +200,7 @@ def assembly_inspection(
 
 
 def unconnected_parts(model: Model) -> list[str]:
-    """Names of the parts that share no node with another part, and that no strap holds."""
+    """Names of the parts that share no node with another part, and that no strap and no joint holds."""
     pairs = np.unique(np.stack([np.repeat(model.element_part, 8), model.hexes.ravel()], axis=1), axis=0)
     users = np.bincount(pairs[:, 1], minlength=len(model.nodes))
     tied = np.unique(pairs[users[pairs[:, 1]] > 1, 0])
@@ -194,7 +208,8 @@ def unconnected_parts(model: Model) -> list[str]:
     if model.info.get("helmet_seat") == "contact":
         ends += [rows for name, rows in model.node_sets.items() if name.startswith("chin_cup_strap")]
     held = pairs[np.isin(pairs[:, 1], np.concatenate(ends)), 0]
-    return [part.name for k, part in enumerate(model.parts) if k not in tied and k not in held]
+    jointed = {pid for joint in model.joints for pid in (joint.first, joint.second)}
+    return [p.name for k, p in enumerate(model.parts) if k not in tied and k not in held and p.pid not in jointed]
 
 
 def _cg_offset(model: Model, measured_in_datum_m: np.ndarray | None) -> float | str:

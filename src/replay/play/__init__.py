@@ -12,9 +12,13 @@ from replay.play.controls import (
     Shake,
     SolverSettings,
 )
+from replay.play.cost import Estimate, estimate
 from replay.play.description import Play, ReconstructionChoice, Window, load_play, play_schema, play_schema_text
+from replay.play.ensemble import ADDRESS, EnsembleSettings, Member, members_of, read_ensemble
 from replay.play.fields import InputFile, NotNegative, Positive, Quaternion, Vector3
 from replay.play.model import HELMET_MASS_KG, HELMET_MASS_RANGE_KG, Helmet, ModelChoice
+from replay.play.overrides import overridden
+from replay.play.table import Row, read_plays_table, write_out
 from replay.play.video import ClicksSource
 from replay.play.wearable import (
     AccelerationColumns,
@@ -31,6 +35,7 @@ from replay.play.wearable import (
 )
 
 __all__ = [
+    "ADDRESS",
     "HELMET_MASS_KG",
     "HELMET_MASS_RANGE_KG",
     "AccelerationColumns",
@@ -42,11 +47,14 @@ __all__ = [
     "CfcFilter",
     "ClicksSource",
     "Contact",
+    "EnsembleSettings",
+    "Estimate",
     "Filter",
     "FrictionPair",
     "Helmet",
     "Hourglass",
     "InputFile",
+    "Member",
     "ModelChoice",
     "NoFilter",
     "NotNegative",
@@ -54,6 +62,7 @@ __all__ = [
     "Positive",
     "Quaternion",
     "ReconstructionChoice",
+    "Row",
     "Shake",
     "SolverSettings",
     "TimeColumn",
@@ -61,7 +70,13 @@ __all__ = [
     "WearableColumns",
     "WearableSource",
     "Window",
+    "estimate",
     "load_play",
+    "members_of",
+    "overridden",
     "play_schema",
     "play_schema_text",
+    "read_ensemble",
+    "read_plays_table",
+    "write_out",
 ]

@@ -15,9 +15,9 @@ from replay.models import Model
 from replay.play import Play
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.frame import Stage, Workspace
+from replay.stages.limits import limits_of, told
 from replay.stages.problem import controls_of, resting_problem, seated_by_contact, unresolved_pairs
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of, told
+from replay.stages.resolved import read_settings
 
 _MOST_PLACES = 4
 
@@ -27,12 +27,17 @@ def run(workspace: Workspace) -> str | None:
     stage = Stage(workspace, "assembly", after=["settings"])
     play = read_settings(stage)
     limits = limits_of(stage)
+    for file in play.model.files:
+        stage.follow("inputs")
+        stage.read("inputs", file)
     model = models.build_model(
         play.model.preset,
         play.model.resolution,
         helmet_mass_kg=play.helmet.mass_kg,
+        design=models.load_design(*play.model.helmet_pieces, folder=play.folder),
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
+        membranes=play.model.membranes,
         seat=play.model.helmet_seat,
     )
     contact = None

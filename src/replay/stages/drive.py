@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from replay.files import read_json
 from replay.motion import Kinematics, build_driver
 from replay.stages.frame import Stage, Workspace
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 
 def run(workspace: Workspace) -> str | None:
@@ -14,10 +16,16 @@ def run(workspace: Workspace) -> str | None:
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
-    source = "kinematics.csv" if play.reconstruction.mode == "protocol" else "posterior_motion.csv"
-    kinematics = Kinematics.read(stage.read("reconstruction", source))
+    chosen = play.reconstruction
+    source = "kinematics.csv" if chosen.mode == "protocol" else "posterior_motion.csv"
     t0 = read_json(stage.read("reconstruction", "quality.json"))["driving_t0_s"]
-    driver = build_driver(kinematics, t0, play.window)
+    if chosen.draw:
+        # a drawn driver is sampled already, on a clock that begins with the window
+        drawn = Kinematics.read(stage.read("reconstruction", f"drivers/driver_{chosen.draw:03d}.csv"))
+        driver = build_driver(drawn, play.window.before_t0_s, play.window)
+        driver = replace(driver, start_s=t0 - play.window.before_t0_s)
+    else:
+        driver = build_driver(Kinematics.read(stage.read("reconstruction", source)), t0, play.window)
     driver.write(
         stage.write_all(
             {

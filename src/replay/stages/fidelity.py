@@ -10,7 +10,7 @@ from replay.measures import Motion, fidelity
 from replay.models import Model, read_model
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
-from replay.stages.verdict import limits_of
+from replay.stages.limits import limits_of
 
 
 def run(workspace: Workspace) -> str | None:

@@ -14,9 +14,9 @@ from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
 from replay.stages.frame import Stage, Workspace
+from replay.stages.limits import limits_of
 from replay.stages.problem import controls_of, driven_problem
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.resolved import read_settings
 
 RUN_FILES = {
     "run.json": "summary of the run",
@@ -78,7 +78,7 @@ def run_driven(
     problem = driven_problem(model, driver, controls, play.solver.contact)
     files = {**RUN_FILES, **BRAIN_FILES}
     recorders: list[Recorder] = [brain_recorder(model)]
-    if has_damage(model):
+    if model.has_damage:
         recorders.append(damage_recorder(model))
         files |= DAMAGE_FILES
     return run_solver(stage, problem, recorders, files, threads=threads)
@@ -90,7 +90,7 @@ def run_solver(
     """Run a problem in the stage's folder and list its files; a run that stops itself ends the play."""
     if problem.contact is not None:
         files = files | CONTACT_FILES
-    if problem.straps:
+    if any(strap.recorded for strap in problem.straps):
         files = files | STRAP_FILES
     folder = stage.write_all(files)
     try:
@@ -107,11 +107,6 @@ def run_solver(
 def brain_recorder(model: Model) -> BrainRecorder:
     """Recorder of the brain's elements with their regions."""
     return BrainRecorder(*_brain(model))
-
-
-def has_damage(model: Model) -> bool:
-    """Whether the brain's law keeps the damage variable."""
-    return model.materials["brain"]["law"] == "brain_isv"
 
 
 def damage_recorder(model: Model) -> DamageRecorder:
@@ -168,10 +163,12 @@ def run_numbers(summary: dict) -> dict[str, float | str]:
     added, mass = summary["added_mass_by_part_kg"], summary["mass_by_part_kg"]
     share = {name: added[name] / mass[name] for name in mass if mass[name] > 0}
     worst = max(share, key=lambda name: share[name])
+    flow = summary["flow_residual"]
     return {
         "added_mass_share": summary["added_mass_kg"] / summary["mass_kg"],
         "added_mass_part_share": share[worst],
         "added_mass_part_share_detail": f"most in {worst}" if share[worst] > 0 else "",
         "min_time_step_s": summary["smallest_time_step_s"],
         "min_volume_ratio": summary["min_volume_ratio"],
+        "flow_residual": "no law of this run solves a flow equation" if flow is None else flow,
     }

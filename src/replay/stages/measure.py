@@ -22,8 +22,7 @@ from replay.measures import (
 from replay.models import read_model
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import has_damage
-from replay.stages.verdict import limits_of
+from replay.stages.limits import limits_of
 
 
 def run(workspace: Workspace) -> str | None:
@@ -43,7 +42,7 @@ def run(workspace: Workspace) -> str | None:
     )
     write_action(stage.write("action.csv", "mechanical action of head and helmet", unit="J s"), time, head, helmet)
     damage = None
-    if has_damage(model):
+    if model.has_damage:
         found = pd.read_csv(stage.read("replay", "brain_damage.csv"))
         found["head_J_s"] = np.interp(found["time_s"], time, head)
         path = stage.write("damage_volume.csv", "damaged volume by region against time and action", unit="m^3")

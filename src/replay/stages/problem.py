@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
+from replay import models
 from replay.models import Model, select_assembly
 from replay.motion import Kinematics
 from replay.play import Contact, Play
@@ -11,6 +14,7 @@ from replay.solver import (
     ContactControls,
     ContactPair,
     Controls,
+    Joint,
     Material,
     PrescribedMotion,
     Problem,
@@ -97,14 +101,38 @@ def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
         return (), ()
     sets, data = model.node_sets, model.info["strap"]
     straps = []
-    for side in ("left", "right"):
-        for end in ("front", "rear"):
-            cup, anchor = sets.get(f"chin_cup_strap_{side}"), sets.get(f"strap_anchor_{end}_{side}")
-            if cup is not None and anchor is not None:
-                rows = np.array([anchor[0], cup[0]], np.int64)
-                straps.append(Strap(f"chin_{end}_{side}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
+    for name in sorted(sets):
+        place = name.removeprefix("strap_anchor_")
+        cup = sets.get(f"chin_cup_strap_{place.rpartition('_')[2]}")
+        if place != name and cup is not None:
+            rows = np.array([sets[name][0], cup[0]], np.int64)
+            straps.append(Strap(f"chin_{place}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
     shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
     return shell, tuple(straps)
+
+
+def membrane_cables(model: Model) -> tuple[Strap, ...]:
+    """Falx and tentorium of a model that has them, cable by cable."""
+    if model.info.get("membranes", "none") == "none":
+        return ()
+    return tuple(
+        Strap(f"{name}_{k}", ends.astype(np.int64), stiffness, recorded=False)
+        for name, net in (("falx", models.falx(model)), ("tentorium", models.tentorium(model)))
+        for k, (ends, stiffness) in enumerate(zip(net.nodes, net.stiffness_n_per_m.tolist()))
+    )
+
+
+def body_links(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Joint, ...]]:
+    """Node sets that move as bodies, and joints, of a model with a body; none of a bare head."""
+    sets = tuple(RigidSet(name, model.node_sets[name].astype(np.int64)) for name in model.rigid_node_sets)
+    joints = tuple(
+        Joint(
+            j.name, j.first, j.second, np.array(j.centre_m), np.array(j.stiffness_n_m_per_rad), j.damping_ratio,
+            j.centre_stiffness_n_per_m, j.centre_damping_ratio, np.array(j.axes),
+        )
+        for j in model.joints
+    )  # fmt: skip
+    return sets, joints
 
 
 def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact: Contact) -> Problem:
@@ -125,8 +153,12 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         The play's ``solver.contact`` block.
     """
     shell, straps = chin_straps(model)
+    parts, (bodies, joints) = solver_parts(model), body_links(model)
     arms = driver.rotation[0].apply(model.nodes)
-    parts = solver_parts(model)
+    turn = driver.rotation[0].as_matrix()
+    joints = tuple(
+        dataclasses.replace(j, centre=driver.position_m[0] + turn @ j.centre, axes=j.axes @ turn.T) for j in joints
+    )
     return Problem(
         nodes=driver.position_m[0] + arms,
         hexes=model.hexes,
@@ -146,8 +178,9 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
-        rigid_sets=shell,
-        straps=straps,
+        rigid_sets=(*shell, *bodies),
+        joints=joints,
+        straps=(*straps, *membrane_cables(model)),
         contact=contact_of(model, contact),
     )
 
@@ -198,7 +231,7 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls, conta
 
 
 def solver_parts(model: Model) -> tuple[SolverPart, ...]:
-    """Parts of a head and helmet model with their materials."""
+    """Parts of a model with their materials."""
     parts = []
     for part in model.parts:
         facts = model.materials[part.material]

@@ -11,7 +11,7 @@ from replay.gates import hourglass_sensitivity_gate
 from replay.measures import regional_summary
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import UNFINISHED, run_driven
-from replay.stages.verdict import limits_of
+from replay.stages.limits import limits_of
 
 _FACTOR = 0.5
 
