@@ -119,17 +119,17 @@ def line(cell: Cell, rows: list[Row]) -> str:
 
 
 def _late(name: str, rows: list[Row]) -> str:
-    """Errors of an instant [ms]."""
-    rows = [r for r in rows if name in r["draws"]]
-    return _pair([1e3 * abs(kept_band(name, r).value - r["truth"][name]) for r in rows]) if rows else "–"
+    """Errors of an instant [ms]; none where a clip was kept before it was measured."""
+    if not all(name in r["draws"] for r in rows):
+        return "–"
+    return _pair([1e3 * abs(kept_band(name, r).value - r["truth"][name]) for r in rows])
 
 
 def _covered(name: str, rows: list[Row]) -> str:
     """Share of the bands that hold the truth, of those that are no wider than a measurement may be."""
-    rows = [r for r in rows if name in r["draws"]]
-    resolved = [(b, r["truth"][name]) for r in rows for b in [kept_band(name, r)] if b.resolved]
-    if not rows:
+    if not all(name in r["draws"] for r in rows):
         return "–"
+    resolved = [(b, r["truth"][name]) for r in rows for b in [kept_band(name, r)] if b.resolved]
     if len(resolved) < SELDOM * len(rows):
         return f"resolved in {len(resolved)}"
     share = 100 * np.mean([b.covers(x) for b, x in resolved])
@@ -138,7 +138,9 @@ def _covered(name: str, rows: list[Row]) -> str:
 
 def _covered_before(rows: list[Row], kind: str) -> str:
     """Share of the components of a velocity before the impact that lie in their bands, where the onset is resolved."""
-    rows = [r for r in rows if "before" in r and kept_band("onset_s", r).resolved]
+    if not all("before" in r for r in rows):
+        return "–"
+    rows = [r for r in rows if kept_band("onset_s", r).resolved]
     if not rows:
         return "–"
     scaled = [np.abs(np.divide(r["before"][kind], r["before"][f"sigma_{kind}"])) for r in rows]
@@ -156,7 +158,7 @@ def accelerations(cells: dict[str, list[Row]]) -> str:
         rows = [row for some in cells.values() for row in some]
         bands = [(kept_band(name, row), row["truth"][name]) for row in rows]
         inside = [band.covers(true) for band, true in bands if band.resolved]
-        out.append(f"{words} in {len(inside)} of {len(rows)} clips ({sum(inside)} bands cover)")
+        out.append(f"{words} in {len(inside)} of {len(rows)} clips" + (f" ({sum(inside)} cover)" if inside else ""))
     return "Peaks of acceleration with a band narrower than a factor of 3: " + ", ".join(out) + "."
 
 
