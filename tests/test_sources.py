@@ -44,7 +44,7 @@ def test_whatever_a_stage_takes_from_the_package_is_among_its_sources(repository
 def test_data_beside_the_code_counts(repository: Path) -> None:
     package = repository / "src" / "replay"
     names = {path.relative_to(package).as_posix() for path in sources_of(package / "stages" / "assemble.py")}
-    assert {"gates/limits.yaml", "models/data/helmet.yaml", "models/data/anatomy.npz"} <= names
+    assert {"gates/limits.yaml", "models/data/helmets/classic.yaml", "models/data/anatomy.npz"} <= names
 
 
 def test_a_stage_does_not_stand_on_what_it_never_asks(repository: Path) -> None:

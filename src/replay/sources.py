@@ -26,14 +26,9 @@ def sources_of(file: Path, package: Path = _PACKAGE) -> list[Path]:
     """
     reached: set[Path] = set()
     _follow(file, package, reached)
-    data = {
-        path
-        for folder in {source.parent for source in reached}
-        for place in (folder, folder / "data")
-        if place.is_dir()
-        for path in place.iterdir()
-        if path.is_file() and path.suffix not in (".py", ".pyc")
-    }
+    folders = {source.parent for source in reached}
+    beside = [path for folder in folders for path in (*folder.iterdir(), *(folder / "data").rglob("*"))]
+    data = {path for path in beside if path.is_file() and path.suffix not in (".py", ".pyc")}
     return sorted(reached | data)
 
 

@@ -15,7 +15,7 @@ rule write_out:
         table=TABLE,
         plays=PLAYS,
         row=row_of,
-        into=WRITTEN_OUT,
+        into=lambda wildcards, output: Path(output[0]).parents[1].as_posix(),
     message:
         "{wildcards.play}: write its row of the table as a play of its own"
     shell:
