@@ -91,7 +91,7 @@ def test_members_share_what_does_not_vary(season: tuple[Checkout, str]) -> None:
     own = ("assembly", "fidelity", "measures", "replay", "settings", "shake")
     assert made == sorted(["bands", *(f"{k}/{stage}" for k in ("001", "002") for stage in own)])
     masses = [
-        json.loads((folder / k / "assembly/mass_properties.json").read_text())["helmet"]["mass_kg"]
+        json.loads((folder / k / "assembly/mass_properties.json").read_text())["assemblies"]["helmet"]["mass_kg"]
         for k in ("001", "002")
     ]
     assert masses == pytest.approx([1.75, 1.9], abs=1e-3)
