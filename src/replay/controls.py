@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from replay.documents import Number, Setting, load_yaml, refuse
-from replay.play import BulkViscosity, InputFile, NotNegative, Positive, Vector3
+from replay.play import BulkViscosity, ContactSettings, InputFile, NotNegative, Positive, Vector3
 
 Name = Annotated[str, Field(min_length=1)]
 NumberOrName = int | Name
@@ -192,6 +192,7 @@ class SolveControls(Setting):
     joints: tuple[JointSettings, ...] = Field(default=(), description="Joints between bodies.")
     straps: tuple[StrapSettings, ...] = Field(default=(), description="Straps.")
     ties: tuple[TieSettings, ...] = Field(default=(), description="Tied interfaces.")
+    contact: ContactSettings | None = Field(default=None, description="Contact of all parts; none without this block.")
 
 
 def load_controls(path: Path) -> SolveControls:

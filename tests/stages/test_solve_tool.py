@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import re
@@ -22,7 +23,8 @@ from replay.controls import SolveControls
 from replay.documents import Setting
 from replay.errors import InputError
 from replay.files import hold_folder
-from replay.models import Model, Part, build_model, write_model
+from replay.models import Model, Part, build_model, read_model, write_model
+from replay.solver import PENETRATION_TABLE
 from replay.solver.blocks import structured_block
 from replay.solver.checkpoint import Checkpoints
 from replay.stages.solver_model import open_model
@@ -139,6 +141,103 @@ def test_two_blocks_run_with_a_tie_a_joint_and_a_rigid_set(
     # body 10 starts with what it was given: translation and the turn about P-Q
     first = pd.read_csv(out / "histories.csv").iloc[0]
     assert (first["vx_m_per_s"], first["omega_z_rad_per_s"]) == (pytest.approx(0.5), pytest.approx(20.0))
+
+
+def thrown(folder: Path, velocity: list[float], contact: dict[str, Any] | None, factor: float = 0.9) -> str:
+    """Controls that throw the pad at the plate, both free and elastic."""
+    rubber = {"youngs_modulus_pa": 1e6, "poisson_ratio": 0.3}
+    return written(
+        folder, termination_time_s=3e-3, time_step_factor=factor, gravity_m_per_s2=[0.0, 0.0, 0.0],
+        ties=[], rigid_sets=[], joints=[],
+        materials=[{"parts": [10], "law": "elastic", "density_kg_per_m3": 2000.0, "parameters": rubber}],
+        initial_velocities=[{"parts": [20], "velocity_m_per_s": velocity}], contact=contact,
+    )  # fmt: skip
+
+
+def test_two_blocks_collide_and_keep_momentum_and_energy(
+    two_blocks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    controls = thrown(tmp_path, [0.0, 0.0, -2.0], {}, factor=0.3)
+    assert main(["solve", str(two_blocks), "--controls", controls, "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    assert "contact: no part lies inside another\n" in text
+    told = json.loads((out / "run.json").read_text())["contact"]
+    assert told["steps"] > 5
+    assert f": contact_unconverged_share {told['unconverged_share']:.4g} (limit < 0.01)" in text
+    assert f"pass: penetration_over_edge {told['penetration_over_edge']:.4g} (limit < 0.05)" in text
+    energy = pd.read_csv(out / "energy.csv")
+    momentum = energy[[f"momentum_{axis}_N_s" for axis in "xyz"]].to_numpy()
+    assert np.abs(momentum - momentum[0]).max() < 1e-12 * abs(momentum[0, 2])
+    assert energy["closure"].abs().max() < 1e-10
+    assert energy["ratio"].between(0.99, 1.01).all()
+    # the plate was at rest and took on most of what the pad lost: they met, and parted
+    ends = pd.read_csv(out / "histories.csv").groupby("pid")["vz_m_per_s"].last()
+    assert ends[10] < -0.5
+    assert ends[20] > ends[10] + 0.5
+    # 8 g of plate have the momentum that contact gave them
+    assert pd.read_csv(out / "contact.csv")["impulse_z_N_s"].iloc[-1] == pytest.approx(8e-3 * ends[10], rel=1e-9)
+    assert json.loads((out / "controls.json").read_text())["contact"] == {
+        "scheme": "lagrange", "most_iterations": 20, "tolerance": 1e-3, "points": "center_plus_corners",
+        "friction": 0.0, "pairs": [], "self_contact": [],
+    }  # fmt: skip
+
+
+def test_without_a_contact_block_they_pass_through_each_other(two_blocks: Path, tmp_path: Path) -> None:
+    controls = thrown(tmp_path, [0.0, 0.0, -2.0], None)
+    assert main(["solve", str(two_blocks), "--controls", controls, "--out", str(tmp_path / "out")]) == 0
+    assert not (tmp_path / "out" / "contact.csv").exists()
+    assert pd.read_csv(tmp_path / "out" / "histories.csv").query("pid == 10")["vz_m_per_s"].abs().max() == 0.0
+
+
+def test_a_friction_pair_by_part_set_drags_as_coulomb_says(two_blocks: Path, tmp_path: Path) -> None:
+    pair = {"first": "plate", "second": "all", "friction": 0.3}
+    controls = thrown(tmp_path, [5.0, 0.0, -1.0], {"pairs": [pair]})
+    out = tmp_path / "out"
+    assert main(["solve", str(two_blocks), "--controls", controls, "--out", str(out)]) == 0
+    last = pd.read_csv(out / "contact.csv").iloc[-1]
+    # it slides all the while: the drag on the plate is the coefficient times the push, less what points aside
+    # where the pad spreads
+    assert 0.97 < last["impulse_x_N_s"] / (-0.3 * last["impulse_z_N_s"]) <= 1.0 + 1e-9
+    assert last["friction_J"] > 0
+    assert pd.read_csv(out / "energy.csv")["closure"].abs().max() < 1e-10
+
+
+def test_parts_of_contact_that_are_not_there_are_told_at_once(
+    two_blocks: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pair = {"first": "plate", "second": "pads", "friction": 0.3}
+    controls = thrown(tmp_path, [0.0, 0.0, -1.0], {"pairs": [pair], "self_contact": ["skin"]})
+    assert main(["solve", str(two_blocks), "--controls", controls, "--out", str(tmp_path / "out")]) == 2
+    text = capsys.readouterr().err
+    assert "2 problems" in text
+    assert "contact.pairs[0].second: the model has no part and no part set 'pads'" in text
+    assert "contact.self_contact[0]: the model has no part and no part set 'skin'" in text
+    assert "plate, pad, all" in text
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("overlap", "code"), [(0.5e-3, 0), (4e-3, 2)])
+def test_a_small_overlap_is_taken_out_and_listed_and_a_deep_one_refused(
+    two_blocks: Path, tmp_path: Path, overlap: float, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = read_model(two_blocks)
+    nodes = model.nodes.copy()
+    nodes[model.nodes[:, 2] > 0.01025, 2] -= 0.5e-3 + overlap
+    path, out = tmp_path / "inside.h5", tmp_path / "out"
+    write_model(path, dataclasses.replace(model, nodes=nodes))
+    controls = thrown(tmp_path, [0.0, 0.0, 0.0], {})
+    assert main(["solve", str(path), "--controls", controls, "--out", str(out)]) == code
+    said = capsys.readouterr()
+    if code:
+        assert "controls.yaml: contact: parts lie inside each other" in said.err
+        assert " mm inside " in said.err
+        assert not out.exists()
+    else:
+        assert "contact: deepest initial penetration 0.5 mm, taken out by moves of up to 0." in said.out
+        table = PENETRATION_TABLE.read(out / "penetrations.csv")
+        assert table["depth_m"].max() == pytest.approx(overlap)
+        assert set(table["part"]) == {"plate", "pad"}
 
 
 def test_every_name_that_is_not_there_is_told_at_once(

@@ -7,6 +7,7 @@ schema of ``workflow/schemas/play.schema.json`` is generated from these models.
 from replay.play.controls import (
     BulkViscosity,
     Contact,
+    ContactSettings,
     FrictionPair,
     Hourglass,
     Shake,
@@ -47,6 +48,7 @@ __all__ = [
     "CfcFilter",
     "ClicksSource",
     "Contact",
+    "ContactSettings",
     "EnsembleSettings",
     "Estimate",
     "Filter",

@@ -35,8 +35,8 @@ class FrictionPair(Setting):
     friction: NotNegative = Field(description="Coulomb's coefficient.", examples=[0.5])
 
 
-class Contact(Setting):
-    """Global contact of all parts, protocol 3.2 and 3.3.5."""
+class ContactSettings(Setting):
+    """Global contact of all parts, protocol 3.3.5."""
 
     scheme: Literal["lagrange"] = Field(
         default="lagrange",
@@ -53,6 +53,13 @@ class Contact(Setting):
         description="What may not pass a face: nodes, or centres too of faces about which the surface turns.",
     )
     friction: NotNegative = Field(default=0.0, description="Coefficient between parts that no pair names.")
+    pairs: tuple[FrictionPair, ...] = Field(default=(), description="Friction by pair; a later one wins.")
+    self_contact: tuple[str, ...] = Field(default=(), description="Parts or part sets that may touch themselves.")
+
+
+class Contact(ContactSettings):
+    """Global contact of all parts, protocol 3.2 and 3.3.5."""
+
     pairs: tuple[FrictionPair, ...] = Field(
         default=(
             FrictionPair(first="scalp", second="H1_pads_set1", friction=0.5),
@@ -63,7 +70,6 @@ class Contact(Setting):
         ),
         description="Friction by pair; a later one wins. Pads and chin cup on skin as in protocol 3.2.",
     )
-    self_contact: tuple[str, ...] = Field(default=(), description="Parts or part sets that may touch themselves.")
 
 
 class SolverSettings(Setting):

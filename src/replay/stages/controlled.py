@@ -26,9 +26,12 @@ from replay.solver import (
     initial_velocity_about_axis,
     node_recorder,
     outer_faces,
+    penetration_table,
     read_motion,
+    seated,
     tie_surfaces,
 )
+from replay.stages.contact import contact_controls, unresolved_names
 from replay.stages.solver_model import SolverModel
 
 
@@ -113,11 +116,14 @@ class SolveTask:
         Histories of nodes and elements that were asked for.
     notes
         What a user should know of how the problem was made.
+    penetrations
+        Columns of `PENETRATION_TABLE`: nodes that were inside another part, and moved; None without contact.
     """
 
     problem: Problem
     recorders: list[Recorder]
     notes: list[str]
+    penetrations: dict[str, list] | None = None
 
 
 def build_task(model: SolverModel, controls: SolveControls, file: Path) -> SolveTask:
@@ -165,6 +171,14 @@ def build_task(model: SolverModel, controls: SolveControls, file: Path) -> Solve
         look.node_rows(controls.output.nodes, "output.nodes"),
         look.element_rows(controls.output.elements, "output.elements"),
     )
+    contact = None
+    if controls.contact is not None:
+        contact = contact_controls(model, controls.contact)
+        for place, name in unresolved_names(model, controls.contact):
+            look.miss(
+                f"contact.{place}", f"the model has no part and no part set {name!r}",
+                ", ".join(dict.fromkeys([*(part.name for part in model.parts), *model.part_sets])),
+            )  # fmt: skip
     if look.errors:
         raise look.errors[0] if len(look.errors) == 1 else InputErrors(look.errors)
     ties: list[Tie] = []
@@ -187,14 +201,25 @@ def build_task(model: SolverModel, controls: SolveControls, file: Path) -> Solve
         prescribed=tuple(read_motion(file.parent / m.file, m.parts, m.rigid_sets) for m in controls.prescribed_motions),
         node_ids=model.node_ids, element_ids=model.element_ids, fixed=fixed, nodal_forces=loads,
         rigid_sets=(*model.rigid_sets, *rigid_sets), joints=(*model.joints, *map(_joint, controls.joints)),
-        straps=tuple(straps), ties=tuple(ties),
+        straps=tuple(straps), ties=tuple(ties), contact=contact,
     )  # fmt: skip
+    penetrations = None
+    if contact is not None:
+        before = problem
+        problem, seating = seated(before)
+        penetrations = penetration_table(seating, before)
+        notes.append(
+            f"contact: deepest initial penetration {1e3 * seating.deepest_before_m:.3g} mm, taken out by moves "
+            f"of up to {seating.share_moved:.2g} of an edge"
+            if len(seating.rows)
+            else "contact: no part lies inside another"
+        )
     recorders: list[Recorder] = []
     if len(written[0]):
         recorders.append(node_recorder(problem, written[0]))
     if len(written[1]):
         recorders.append(element_recorder(problem, written[1]))
-    return SolveTask(problem, recorders, notes)
+    return SolveTask(problem, recorders, notes, penetrations)
 
 
 def _numbers(c: SolveControls) -> Controls:

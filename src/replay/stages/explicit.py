@@ -9,8 +9,10 @@ from pathlib import Path
 from replay.controls import load_controls
 from replay.errors import InputError
 from replay.files import hold_folder, write_json
-from replay.solver import solve
+from replay.solver import PENETRATION_TABLE, solve
 from replay.solver.arrays import WHERE
+from replay.solver.contact.settings import WHERE as CONTACT
+from replay.stages.contact import contact_lines
 from replay.stages.controlled import build_task
 from replay.stages.solver_model import open_model
 
@@ -50,6 +52,8 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
             print(note)
         with hold_folder(out, "this run"):
             write_json(out / "controls.json", settings.model_dump(mode="json"))
+            if task.penetrations is not None:
+                PENETRATION_TABLE.write(out / "penetrations.csv", task.penetrations)
             summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
     low, high = summary.energy_ratio_range
     energies = summary.energies
@@ -57,9 +61,13 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
     print(
         f"{model}: {1e3 * summary.time_s:.6g} ms in {summary.steps} steps, energy ratio {low:.5f} to {high:.5f}\n"
         f"    kinetic {energies['kinetic_J']:.6g} J, internal {energies['internal_J']:.6g} J, "
-        f"hourglass {energies['hourglass_J']:.6g} J, added mass {summary.added_mass_kg:.3g} kg{flow}\n"
-        f"    results: {out}"
+        f"hourglass {energies['hourglass_J']:.6g} J, added mass {summary.added_mass_kg:.3g} kg{flow}"
     )
+    if task.problem.contact is not None:
+        print(f"    contact {energies['contact_normal_J']:.6g} J, friction {energies['friction_J']:.6g} J lost")
+        for line in contact_lines(out):
+            print(f"        {line}")
+    print(f"    results: {out}")
     return 0
 
 
@@ -69,6 +77,7 @@ def _told_of(controls: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        if error.file != WHERE:
+        if error.file not in (WHERE, CONTACT):
             raise
-        raise InputError(controls, error.found, expected=error.expected, mend=error.mend, column=error.column) from None
+        column = error.column if error.file == WHERE else ".".join(filter(None, ("contact", error.column)))
+        raise InputError(controls, error.found, expected=error.expected, mend=error.mend, column=column) from None

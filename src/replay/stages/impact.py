@@ -13,6 +13,7 @@ from replay.measures import BrainRecorder, DamageRecorder
 from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
+from replay.stages.contact import contact_numbers
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
 from replay.stages.problem import controls_of, driven_problem
@@ -138,24 +139,6 @@ def judge_numerics(stage: Stage) -> Gate:
         steps=steps["step"].to_numpy(),
         contact=contact_numbers(summary, energy),
     )
-
-
-def contact_numbers(summary: dict, energy: pd.DataFrame) -> dict[str, float | str] | None:
-    """What the gates ask about contact, from ``run.json`` and ``energy.csv``; None for a run without contact."""
-    told = summary["contact"]
-    if not told:
-        return None
-    internal = float(energy["internal_J"].max())
-    made = max(0.0, -float(energy["contact_normal_J"].min()))
-    # the ledger's friction is a loss; work of 1e-12 of what there is, is rounding
-    friction = -float(energy["friction_J"].min())
-    return {
-        "contact_creation_share": made / internal if internal > 0 else "the run has no internal energy",
-        "friction_work_J": friction if friction > 1e-12 * internal else -float(energy["friction_J"].max()),
-        "contact_unconverged_share": told["unconverged_share"] if told["steps"] else "nothing touched",
-        "contact_unconverged_share_detail": f"{told['mean_iterations']:.1f} iterations a step",
-        "penetration_over_edge": told["penetration_over_edge"],
-    }
 
 
 def run_numbers(summary: dict) -> dict[str, float | str]:

@@ -12,7 +12,6 @@ from replay.motion import Kinematics
 from replay.play import Contact, Play
 from replay.solver import (
     ContactControls,
-    ContactPair,
     Controls,
     Joint,
     Material,
@@ -22,6 +21,7 @@ from replay.solver import (
     SolverPart,
     Strap,
 )
+from replay.stages.contact import contact_controls, part_numbers
 
 
 def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hourglass_factor: float = 1.0) -> Controls:
@@ -53,13 +53,6 @@ def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hou
     )
 
 
-def part_numbers(model: Model, name: str) -> tuple[int, ...]:
-    """Numbers of the part, or of the parts of the set, of this name; none if there is neither."""
-    if name in model.part_sets:
-        return model.part_sets[name]
-    return tuple(part.pid for part in model.parts if part.name == name)
-
-
 def unresolved_pairs(model: Model, contact: Contact) -> list[str]:
     """Friction pairs, and names of self-contact, of which the model lacks a side."""
     pairs = [
@@ -79,20 +72,7 @@ def contact_of(model: Model, contact: Contact) -> ContactControls | None:
     """Contact of the parts that a model has, if it is seated by it; pairs of which it lacks a side are left out."""
     if not seated_by_contact(model):
         return None
-    pairs = []
-    for pair in contact.pairs:
-        first, second = part_numbers(model, pair.first), part_numbers(model, pair.second)
-        if first and second:
-            pairs.append(ContactPair(first, second, pair.friction, name=f"{pair.first}-{pair.second}"))
-    itself = [pid for name in contact.self_contact for pid in part_numbers(model, name)]
-    return ContactControls(
-        most_iterations=contact.most_iterations,
-        tolerance=contact.tolerance,
-        points=contact.points,
-        friction=contact.friction,
-        pairs=tuple(pairs),
-        self_contact=tuple(dict.fromkeys(itself)),
-    )
+    return contact_controls(model, contact)
 
 
 def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
