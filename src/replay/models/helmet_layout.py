@@ -15,10 +15,6 @@ from scipy.sparse.linalg import spsolve
 from replay.models.cubed_sphere import CubeLattice
 from replay.models.helmet_design import Cup, HelmetDesign, HelmetShell, Opening, PadSet
 
-#: A pad narrower than this many hexes would be sheared by hourglass modes.
-LEAST_ROWS = 3
-#: On fewer divisions of a face an opening over the ear would leave no pad beside it.
-_LEAST_DIVISIONS = 8
 _FACES = {"front": (0, 1), "back": (0, -1), "left": (1, 1), "right": (1, -1), "crown": (2, 1)}
 
 
@@ -54,7 +50,7 @@ def helmet_layout(lattice: CubeLattice, design: HelmetDesign) -> HelmetLayout:
     open_ear = _opening(lattice, covered, design.shell.ear)
     if open_ear.any():
         directions = _rounded(lattice, open_ear, directions, covered)
-    pad = _pad_zones(lattice, covered & ~open_ear, design.pads)
+    pad = np.where(covered & ~open_ear, _pad_zones(lattice, design.pads), -1)
     return HelmetLayout(covered, covered & ~open_ear, pad, _chin(lattice, design.chinstrap.cup), directions)
 
 
@@ -85,36 +81,25 @@ def _covered(centres: np.ndarray, shell: HelmetShell) -> np.ndarray:
     return top | (~bottom & np.where(front, z > shell.coverage.brow, z > shell.coverage.bottom))
 
 
-def _pad_zones(lattice: CubeLattice, carried: np.ndarray, pads: PadSet) -> np.ndarray:
-    """Pad of each quad that the shell carries; of two that would share a node the later one gives way."""
+def _pad_zones(lattice: CubeLattice, pads: PadSet) -> np.ndarray:
+    """Pad of each quad; of two that would share a node the later one gives way."""
     centres = lattice.quad_centres
     pad, taken = np.full(len(centres), -1), np.zeros(len(lattice.surface), dtype=bool)
     for index, zone in enumerate(pads.pads.values()):
         axis, end = _FACES[zone.face]
-        free = (centres[:, axis] == end) & carried & ~taken[lattice.quads].any(axis=1)
-        ranges = (zone.x, zone.y, zone.z)
-        inside = [(value >= low) & (value <= high) for value, (low, high) in zip(centres.T, ranges)]
-        across = [k for k in range(3) if k != axis]
-        here = free.copy()
-        for k, other in (across, across[::-1]):
-            here &= _wide_enough(centres[:, k], free & inside[other], *ranges[k])
+        here = centres[:, axis] == end
+        for value, (low, high) in zip(centres.T, (zone.x, zone.y, zone.z)):
+            here &= (value >= low) & (value <= high)
+        here &= ~taken[lattice.quads].any(axis=1)
         pad[here] = index
         taken[lattice.quads[here]] = True
     return pad
 
 
-def _wide_enough(value: np.ndarray, others: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Cells of a range, and the rows nearest to it of `others` where it holds fewer than a pad needs."""
-    rows = np.unique(value[others])
-    far = np.maximum(np.maximum(low - rows, rows - high), 0.0)
-    nearest = rows[np.argsort(far, kind="stable")[:LEAST_ROWS]]
-    return ((value >= low) & (value <= high)) | np.isin(value, nearest)
-
-
 def _opening(lattice: CubeLattice, covered: np.ndarray, ear: Opening | None) -> np.ndarray:
     """Quads of the openings over the ears; none on a lattice too coarse to close below them."""
     x, y, z = lattice.quad_centres.T
-    if ear is None or lattice.divisions < _LEAST_DIVISIONS:
+    if ear is None:
         return np.zeros(len(x), dtype=bool)
     chosen = (np.abs(y) == 1) & (x >= ear.x[0]) & (x <= ear.x[1]) & (z >= ear.z[0]) & (z <= ear.z[1])
     at_edge = np.zeros(len(lattice.surface), dtype=bool)
