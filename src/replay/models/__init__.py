@@ -5,7 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from replay.models.build import build_model
-from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
+from replay.models.inspection import (
+    assembly_inspection,
+    assembly_mass,
+    helmet_inspection,
+    mass_report,
+    parts_outside_block,
+)
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
 from replay.models.model import Model, Part, read_model, write_model
 from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
@@ -32,6 +38,7 @@ __all__ = [
     "helmet_inspection",
     "load_materials",
     "mass_report",
+    "parts_outside_block",
     "parts_table",
     "read_model",
     "select_assembly",

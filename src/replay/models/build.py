@@ -25,7 +25,12 @@ HEAD_PART_IDS = {
     "face": 60009021,
 }  # fmt: skip
 HEAD_ROLES = {"grey_matter": "brain", "white_matter": "brain"}
-PID_BLOCKS = {"head": (60_000_000, 69_999_999), "helmet": (10_000_000, 19_999_999)}
+PID_BLOCKS = {
+    "head": (60_000_000, 69_999_999),
+    "helmet": (10_000_000, 19_999_999),
+    "impactor_head": (40_000_000, 49_999_999),
+    "impactor_helmet": (20_000_000, 29_999_999),
+}
 SET_IDS = {
     "H1_pads_set1": 10000099,
     "H1_pads_set2": 10000100,

@@ -16,7 +16,9 @@ FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), 
 """Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
 
 
-def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
+def assembly_mass(
+    model: Model, assembly: str | None = None, *, name: str | None = None, player: str | None = None
+) -> MassProperties:
     """Mass properties of an assembly, of one part by name, or of everything.
 
     Parameters
@@ -27,8 +29,10 @@ def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None
         ``head`` or ``helmet``.
     name
         Name of one part.
+    player
+        ``struck`` or ``impactor``.
     """
-    chosen = model.elements_of(assembly=assembly)
+    chosen = model.elements_of(assembly=assembly, player=player)
     if name is not None:
         chosen &= model.element_part == model.part_index(name)
     return mass_properties(model.nodes, model.hexes[chosen], model.element_densities()[chosen])
@@ -156,9 +160,7 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    outside = [
-        part.name for part in model.parts if not PID_BLOCKS[part.assembly][0] < part.pid <= PID_BLOCKS[part.assembly][1]
-    ]
+    outside = parts_outside_block(model)
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"
@@ -183,6 +185,16 @@ def assembly_inspection(
         "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
+
+
+def parts_outside_block(model: Model) -> list[str]:
+    """Names of the parts whose number lies outside the block of their player's assembly (protocol 1.6)."""
+    outside = []
+    for part in model.parts:
+        low, high = PID_BLOCKS[part.assembly if part.player == "struck" else f"impactor_{part.assembly}"]
+        if not low < part.pid <= high:
+            outside.append(part.name)
+    return outside
 
 
 def unconnected_parts(model: Model) -> list[str]:

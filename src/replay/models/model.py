@@ -67,6 +67,8 @@ class Part:
         ``head`` or ``helmet``.
     material
         Key of the model's `materials`.
+    player
+        ``struck`` or ``impactor``, of a model of two players.
     """
 
     pid: int
@@ -74,6 +76,7 @@ class Part:
     role: str
     assembly: str
     material: str
+    player: str = "struck"
 
 
 @dataclass(frozen=True)
@@ -137,12 +140,14 @@ class Model:
                 return index
         raise KeyError(name)
 
-    def elements_of(self, *, role: str | None = None, assembly: str | None = None) -> np.ndarray:
-        """Mask (m,) bool of the elements whose part has this role and belongs to this assembly."""
-        chosen = np.array(
-            [(role in (None, p.role)) and (assembly in (None, p.assembly)) for p in self.parts], dtype=bool
-        )
-        return chosen[self.element_part]
+    def elements_of(
+        self, *, role: str | None = None, assembly: str | None = None, player: str | None = None
+    ) -> np.ndarray:
+        """Mask (m,) bool of the elements whose part has this role and belongs to this assembly and player."""
+        chosen = [
+            role in (None, p.role) and assembly in (None, p.assembly) and player in (None, p.player) for p in self.parts
+        ]
+        return np.array(chosen, dtype=bool)[self.element_part]
 
     def element_densities(self) -> np.ndarray:
         """Density of each element, (m,) float64 [kg/m^3]."""
