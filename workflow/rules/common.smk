@@ -57,6 +57,29 @@ def stage(name):
     return f"results/{{play}}/{name}/manifest.json"
 
 
+def collides(wildcards):
+    """Whether the play is a collision; what is wrong with its description is the settings stage's to say."""
+    try:
+        path = Path(PLAYS) / wildcards.play / "play.yaml"
+        return bool(yaml.safe_load(path.read_text(encoding="utf-8")).get("collision"))
+    except (OSError, ValueError, AttributeError, yaml.YAMLError):
+        return False
+
+
+def placement(wildcards):
+    """Where two players stand; one driven head has no such stage."""
+    return [stage("placement")] if collides(wildcards) else []
+
+
+def evidence(*more):
+    """Manifests of every stage before the verdict that a play of its mode has, and more."""
+
+    def manifests(wildcards):
+        return [*map(stage, (*EVIDENCE, *more)), *placement(wildcards)]
+
+    return manifests
+
+
 # Every stage before the verdict. What reads them all names them all: a stage whose files were removed is run again.
 EVIDENCE = (
     "settings",

@@ -20,6 +20,34 @@ rule assemble:
         "replay assemble {wildcards.play} --carry-on 2>&1 | tee {log}"
 
 
+rule place:
+    input:
+        settings=stage("settings"),
+        assembly=stage("assembly"),
+        driver=stage("driver"),
+        code=code(
+            "stages/placement.py",
+            "stages/players.py",
+            "stages/collision.py",
+            "stages/problem.py",
+            "stages/frame.py",
+            "models",
+            "solver/contact",
+            "gates",
+        ),
+    output:
+        stage("placement"),
+    log:
+        log("place"),
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    message:
+        "{wildcards.play}: bring two players to first contact"
+    shell:
+        "replay place {wildcards.play} --carry-on 2>&1 | tee {log}"
+
+
 rule shake:
     input:
         settings=stage("settings"),
@@ -53,6 +81,7 @@ rule decks:
         settings=stage("settings"),
         assembly=stage("assembly"),
         driver=stage("driver"),
+        placement=placement,
         code=code("stages/decks.py", "stages/frame.py", "decks", "models"),
     output:
         stage("decks"),

@@ -6,11 +6,14 @@ rule impact:
         settings=stage("settings"),
         assembly=stage("assembly"),
         driver=stage("driver"),
+        placement=placement,
         shake=stage("shake"),
         code=code(
             "stages/impact.py",
             "stages/frame.py",
             "stages/problem.py",
+            "stages/players.py",
+            "stages/collision.py",
             "models",
             "solver",
             "measures",
@@ -37,11 +40,15 @@ rule sensitivity:
         settings=stage("settings"),
         assembly=stage("assembly"),
         driver=stage("driver"),
+        placement=placement,
+        shake=stage("shake"),
         replay=stage("replay"),
         code=code(
             "stages/sensitivity.py",
             "stages/frame.py",
             "stages/problem.py",
+            "stages/players.py",
+            "stages/collision.py",
             "models",
             "solver",
             "measures",
@@ -67,6 +74,7 @@ rule fidelity:
     input:
         settings=stage("settings"),
         driver=stage("driver"),
+        placement=placement,
         replay=stage("replay"),
         code=code("stages/fidelity.py", "stages/frame.py", "measures", "gates"),
     output:
@@ -83,6 +91,7 @@ rule measure:
     input:
         settings=stage("settings"),
         assembly=stage("assembly"),
+        placement=placement,
         replay=stage("replay"),
         sensitivity=stage("sensitivity"),
         code=code("stages/measure.py", "stages/frame.py", "measures", "models"),

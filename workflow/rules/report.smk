@@ -3,7 +3,7 @@
 
 rule verdict:
     input:
-        stages=[stage(name) for name in EVIDENCE],
+        stages=evidence(),
         code=code("stages/verdict.py", "stages/frame.py", "gates", "bundle"),
     output:
         stage("verdict"),
@@ -17,7 +17,7 @@ rule verdict:
 
 rule report:
     input:
-        stages=[stage(name) for name in (*EVIDENCE, "verdict")],
+        stages=evidence("verdict"),
         code=code("stages/report.py", "stages/frame.py", "report"),
     output:
         manifest=stage("report"),
@@ -41,7 +41,7 @@ rule report:
 rule seal:
     input:
         play=f"{PLAYS}/{{play}}/play.yaml",
-        stages=[stage(name) for name in (*EVIDENCE, "verdict", "report")],
+        stages=evidence("verdict", "report"),
         lock="environment.lock",
         code=code("stages/seal.py", "stages/frame.py", "bundle"),
     output:

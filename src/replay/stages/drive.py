@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from replay.files import read_json
+from replay.files import read_json, write_json
 from replay.motion import Kinematics, build_driver
 from replay.stages.frame import Stage, Workspace
+from replay.stages.players import ROLES, start_of
 from replay.stages.settings import read_settings
 
 
@@ -21,11 +22,14 @@ def run(workspace: Workspace) -> str | None:
     driver.write(
         stage.write_all(
             {
-                "driver_6dof.csv": "motion prescribed to the skull's centre of gravity, global axes",
+                "driver_6dof.csv": "motion of the skull's centre of gravity, global axes: what a driven head is told",
                 "initial_velocity.json": "velocities, pose and axis P-Q at the start; overshoot and closure",
             }
         )
     )
+    if play.collision is not None:
+        starts = {role: start_of(play.collision, role, kinematics, driver.start_s).to_json() for role in ROLES}
+        write_json(stage.write("starts.json", "posture and velocities of both players at first contact"), starts)
     quality = driver.quality
     print(
         f"driver: {play.window.duration_s * 1e3:g} ms from {driver.start_s:.4f} s; overshoot of acceleration "

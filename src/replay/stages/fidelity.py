@@ -7,23 +7,27 @@ import pandas as pd
 from replay.files import write_json
 from replay.gates import fidelity_gate
 from replay.measures import Motion, fidelity
-from replay.models import Model, read_model
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
+from replay.stages.impact import replayed_model
+from replay.stages.settings import read_settings
 from replay.stages.verdict import limits_of
 
 
 def run(workspace: Workspace) -> str | None:
     """Compare target and applied motion of the skull's centre of gravity, and judge it."""
-    stage = Stage(workspace, "fidelity", after=["settings", "assembly", "driver", "replay"])
+    stage = Stage(workspace, "fidelity", after=["settings", "assembly", "driver", "placement", "replay"])
     if stage.stopped_by:
         return stage.skip()
-    model = read_model(stage.read("assembly", "model.h5"))
+    play = read_settings(stage)
+    tracked = "struck" if play.collision is None else play.collision.tracked
     target = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
-    result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage, model))
+    result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage, tracked))
     write_json(stage.write("fidelity.json", "target against applied motion, article Table 4"), result)
     gate = fidelity_gate(
-        {**result, **{name: _judged(result[name]) for name in _QUANTITIES}}, limits_of(stage), prescribed=True
+        {**result, **{name: _judged(result[name]) for name in _QUANTITIES}},
+        limits_of(stage),
+        prescribed=play.collision is None,
     )
     gate.write(stage.write("gate.json", "gate: driver fidelity"))
     return stage.finish([gate])
@@ -32,9 +36,10 @@ def run(workspace: Workspace) -> str | None:
 _QUANTITIES = ("linear_acceleration", "angular_acceleration", "angular_velocity")
 
 
-def skull_motion(stage: Stage, model: Model) -> Motion:
-    """Motion of the driven skull, from the solver's histories."""
-    skull = next(part.pid for part in model.parts if part.role == "skull")
+def skull_motion(stage: Stage, player: str = "struck") -> Motion:
+    """Motion of a player's skull, from the solver's histories."""
+    parts = replayed_model(stage).parts
+    skull = next(part.pid for part in parts if part.role == "skull" and part.player == player)
     return Motion.from_history(pd.read_csv(stage.read("replay", "histories.csv")), skull)
 
 

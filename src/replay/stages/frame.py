@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from replay import __version__
 from replay.errors import InputError
-from replay.files import LOCK, hold_folder
+from replay.files import LOCK, hold_folder, read_json
 from replay.manifest import NAME, Artifact, StageManifest, check_manifest, write_manifest
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ class Stage:
     name
         Name of the stage: its folder.
     after
-        The stages whose files this one may read; they must have finished, and their files must not have
-        changed since.
+        The stages whose files this one may read, as far as the play's mode has them; they must have finished, and
+        their files must not have changed since.
     keep
         Names in the folder that survive from an unfinished run (a checkpoint).
 
@@ -71,7 +71,8 @@ class Stage:
         self.workspace, self.name = workspace, name
         self.folder = workspace.folder(name)
         self._before: dict[str, StageManifest] = {}
-        for stage in after:
+        here = stages_of(workspace)
+        for stage in (name for name in after if name in here):
             self._before[stage] = check_stage(workspace, stage)
         self._inputs: dict[str, Path] = {}
         self._artifacts: list[Artifact] = []
@@ -134,8 +135,8 @@ class Stage:
         return full
 
     def made(self, stage: str, path: str) -> bool:
-        """Whether an earlier stage made a file; a play that was stopped has fewer."""
-        return self._before[stage].artifact(path) is not None
+        """Whether an earlier stage made a file; a play that was stopped has fewer, one of another mode other stages."""
+        return stage in self._before and self._before[stage].artifact(path) is not None
 
     def folder_for_many(self) -> Path:
         """The stage's folder, cleared, for a writer that names its own files; list them with `write` afterwards."""
@@ -224,6 +225,7 @@ _COMMANDS = {
     "reconstruction": "reconstruct",
     "driver": "drive",
     "assembly": "assemble",
+    "placement": "place",
     "decks": "decks",
     "shake": "shake",
     "replay": "impact",
@@ -235,3 +237,11 @@ _COMMANDS = {
 }
 STAGES = tuple(_COMMANDS)
 """Every stage with a manifest, in the order of the protocol."""
+_OF_COLLISIONS = ("placement",)
+
+
+def stages_of(workspace: Workspace) -> tuple[str, ...]:
+    """The stages that a play of this mode has, by its resolved settings."""
+    settings = workspace.folder("settings") / "play.json"
+    collides = settings.is_file() and read_json(settings).get("collision") is not None
+    return tuple(stage for stage in STAGES if collides or stage not in _OF_COLLISIONS)

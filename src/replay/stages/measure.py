@@ -19,29 +19,40 @@ from replay.measures import (
     regional_summary,
     write_action,
 )
-from replay.models import read_model
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import has_damage
+from replay.stages.impact import has_damage, replayed_model
 from replay.stages.verdict import limits_of
+
+_DRIVEN = "a driven head has no impactor: the crossover is that of head and helmet"
+_COLLISION = "the impactor is all of the striking player; the crossover is that of the struck head and the impactor"
 
 
 def run(workspace: Workspace) -> str | None:
     """Measure the replayed head; nothing here is an injury criterion or a verdict on a person."""
-    stage = Stage(workspace, "measures", after=["settings", "assembly", "replay", "sensitivity"])
+    stage = Stage(workspace, "measures", after=["settings", "assembly", "placement", "replay", "sensitivity"])
     if stage.stopped_by:
         return stage.skip()
-    model = read_model(stage.read("assembly", "model.h5"))
+    model = replayed_model(stage)
     energy = pd.read_csv(stage.read("replay", "part_energy.csv"))
     brain = pd.read_csv(stage.read("replay", "brain_histories.csv"))
     gate = read_gate(stage.read("sensitivity", "gate.json"), limits_of(stage))
 
     time = energy["time_s"].unique()
-    head, helmet = (
-        mechanical_action(time, kinetic_energy_of(energy, [p.pid for p in model.parts if p.assembly == assembly]))
+    bodies = {
+        assembly: [p.pid for p in model.parts if p.assembly == assembly and p.player == "struck"]
         for assembly in ("head", "helmet")
+    }
+    bodies["impactor"] = [p.pid for p in model.parts if p.player == "impactor"]
+    action = {name: mechanical_action(time, kinetic_energy_of(energy, pids)) for name, pids in bodies.items() if pids}
+    head, impactor = action["head"], action.get("impactor")
+    write_action(
+        stage.write("action.csv", "mechanical action of head, helmet and impactor", unit="J s"),
+        time,
+        head,
+        action["helmet"],
+        impactor,
     )
-    write_action(stage.write("action.csv", "mechanical action of head and helmet", unit="J s"), time, head, helmet)
     damage = None
     if has_damage(model):
         found = pd.read_csv(stage.read("replay", "brain_damage.csv"))
@@ -53,21 +64,27 @@ def run(workspace: Workspace) -> str | None:
         stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
         {
             "statement": "process diagnostics; no statement on injury or on a player",
-            "head": head_measures(in_head_axes(skull_motion(stage, model)), file="replay/histories.csv"),
+            "head": head_measures(in_head_axes(skull_motion(stage)), file="replay/histories.csv"),
             "brain": regional_summary(brain),
             "damage": damage,
             "brain_convergence_class": convergence_class(gate),
             "action": {
                 "unit": "J s",
                 "head": float(head[-1]),
-                "helmet": float(helmet[-1]),
-                "crossover_time_s": crossover_time(time, head, helmet),
-                "impactor": None,
-                "note": "a driven head has no impactor: its action needs contact",
+                "helmet": float(action["helmet"][-1]),
+                "impactor": None if impactor is None else float(impactor[-1]),
+                **_crossover(time, head, action["helmet"] if impactor is None else impactor),
+                "note": _DRIVEN if impactor is None else _COLLISION,
             },
         },
     )
     return stage.finish()
+
+
+def _crossover(time: np.ndarray, head: np.ndarray, other: np.ndarray) -> dict[str, float | None]:
+    """When the actions of head and impactor (of a driven head: head and helmet) cross; None where they do not."""
+    found = crossover_time(time, head, other)
+    return {"crossover_time_s": None if np.isnan(found) else found}
 
 
 def in_head_axes(motion: Motion) -> dict[str, np.ndarray]:

@@ -73,8 +73,11 @@ def seated_by_contact(model: Model) -> bool:
 
 def contact_of(model: Model, contact: Contact) -> ContactControls | None:
     """Contact of the parts that a model has, if it is seated by it; pairs of which it lacks a side are left out."""
-    if not seated_by_contact(model):
-        return None
+    return contact_controls(model, contact) if seated_by_contact(model) else None
+
+
+def contact_controls(model: Model, contact: Contact, more: tuple[ContactPair, ...] = ()) -> ContactControls:
+    """The play's contact settings for a model, with further pairs after its own."""
     pairs = []
     for pair in contact.pairs:
         first, second = part_numbers(model, pair.first), part_numbers(model, pair.second)
@@ -86,24 +89,30 @@ def contact_of(model: Model, contact: Contact) -> ContactControls | None:
         tolerance=contact.tolerance,
         points=contact.points,
         friction=contact.friction,
-        pairs=tuple(pairs),
+        pairs=(*pairs, *more),
         self_contact=tuple(dict.fromkeys(itself)),
     )
 
 
-def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
-    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
+def chin_straps(model: Model, prefix: str = "") -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
+    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them.
+
+    `prefix` stands before the names of the player's node sets.
+    """
     if not seated_by_contact(model):
         return (), ()
-    sets, data = model.node_sets, model.info["strap"]
+    sets = {name.removeprefix(prefix): rows for name, rows in model.node_sets.items() if name.startswith(prefix)}
+    data = model.info["strap"]
     straps = []
     for side in ("left", "right"):
         for end in ("front", "rear"):
             cup, anchor = sets.get(f"chin_cup_strap_{side}"), sets.get(f"strap_anchor_{end}_{side}")
             if cup is not None and anchor is not None:
                 rows = np.array([anchor[0], cup[0]], np.int64)
-                straps.append(Strap(f"chin_{end}_{side}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
-    shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
+                straps.append(
+                    Strap(f"{prefix}chin_{end}_{side}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"])
+                )
+    shell = (RigidSet(f"{prefix}chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
     return shell, tuple(straps)
 
 

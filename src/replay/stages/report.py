@@ -11,11 +11,12 @@ from replay import __version__
 from replay.files import read_json
 from replay.gates import Limits
 from replay.measures import Motion, read_snapshots
-from replay.models import Model, read_model
+from replay.models import Model
 from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
-from replay.stages.frame import Stage, Workspace
+from replay.stages.frame import Stage, Workspace, stages_of
+from replay.stages.impact import replayed_model
 from replay.stages.settings import read_settings
 from replay.stages.verdict import ALL_GATE_FILES, GATE_FILES, limits_of
 
@@ -24,6 +25,7 @@ _TITLES = {
     "reconstruction": "Reconstruction",
     "driver": "Driver",
     "assembly": "Head and helmet",
+    "placement": "Two players placed",
     "shake": "Helmet shake",
     "decks": "Run decks",
     "replay": "Replay",
@@ -34,6 +36,10 @@ _TITLES = {
 _DRIVEN = (
     "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
     " and facemask forces, contact work and the action of an impactor are not computed."
+)
+_COLLIDED = (
+    "The rest of the players. Two helmeted heads collide without necks and bodies, so that what follows the first"
+    " milliseconds lacks the mass and the restraint that a neck would bring."
 )
 _SEAT = {
     "shared_nodes": (
@@ -79,7 +85,7 @@ def collect(stage: Stage) -> ReportInput:
     limits = limits_of(stage)
     inputs = read_json(stage.read("inputs", "inputs.json"))
     quality = read_json(stage.read("reconstruction", "quality.json"))
-    model = read_model(stage.read("assembly", "model.h5"))
+    model = replayed_model(stage)
     known: dict[str, Any] = {
         "play": _play_facts(play, quality, inputs),
         "verdict": read_json(stage.read("verdict", "verdict.json")),
@@ -98,7 +104,7 @@ def collect(stage: Stage) -> ReportInput:
         "mesh": _mesh(model),
         "cannot_show": [
             _SEAT[play.model.helmet_seat],
-            _DRIVEN,
+            _COLLIDED if play.collision else _DRIVEN,
             _BRAIN[play.model.brain_material],
             _STRUCTURE[play.model.helmet_structure],
             *quality["warnings"],
@@ -119,7 +125,8 @@ def collect(stage: Stage) -> ReportInput:
 def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     """What only a replay that ran to its end has."""
     measures = read_json(stage.read("measures", "measures.json"))
-    applied = skull_motion(stage, model)
+    tracked = "struck" if play.collision is None else play.collision.tracked
+    applied = skull_motion(stage, tracked)
     fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
     damaged = stage.made("measures", "damage_volume.csv")
@@ -195,7 +202,8 @@ def _gates(stage: Stage, limits: Limits) -> list[Any]:
 
 def _stages(stage: Stage) -> list[dict[str, str]]:
     rows = []
-    for name, title in _TITLES.items():
+    here = stages_of(stage.workspace)
+    for name, title in ((name, title) for name, title in _TITLES.items() if name in here):
         manifest = stage.manifest_of(name)
         verdicts = [
             read_json(stage.read(name, file))["verdict"] for file in GATE_FILES.get(name, ()) if stage.made(name, file)

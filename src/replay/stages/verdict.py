@@ -10,12 +10,13 @@ from replay.bundle import package_facts
 from replay.files import write_json
 from replay.gates import Gate, Limits, PlayVerdict, package_gate, play_verdict, read_gate
 from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
-from replay.stages.frame import Stage, Workspace
+from replay.stages.frame import STAGES, Stage, Workspace
 from replay.stages.settings import read_settings
 
 GATE_FILES = {
     "reconstruction": ("gate.json",),
     "assembly": ("gate_helmet.json", "gate.json"),
+    "placement": ("gate.json",),
     "shake": ("gate.json",),
     "replay": ("gate.json",),
     "sensitivity": ("gate.json",),
@@ -23,7 +24,6 @@ GATE_FILES = {
 }
 ALL_GATE_FILES = {**GATE_FILES, "verdict": ("gate.json",)}
 """With the package gate, which the verdict stage judges itself."""
-_AFTER = ("settings", "reconstruction", "assembly", "decks", "shake", "replay", "sensitivity", "fidelity", "measures")
 
 
 def limits_of(stage: Stage) -> Limits:
@@ -37,7 +37,7 @@ def limits_of(stage: Stage) -> Limits:
         "assembly.helmet_cg_difference_m": play.helmet.cg_tolerance_m,
         "helmet.cg_offset_m": play.helmet.cg_tolerance_m,
     }
-    return Limits.load({**tolerances, **play.gates})
+    return Limits.load({**tolerances, **play.gates}, mode=play.mode)
 
 
 def told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:
@@ -53,7 +53,7 @@ def collect(stage: Stage) -> list[Gate]:
         read_gate(stage.read(name, file), limits)
         for name, files in GATE_FILES.items()
         for file in files
-        if stage.manifest_of(name).artifact(file)
+        if stage.made(name, file)
     ]
 
 
@@ -68,7 +68,7 @@ def package(stage: Stage) -> Gate:
 
 def run(workspace: Workspace) -> str | None:
     """Collect the gates, judge the package of a play that ran to its end, and write ``verdict.json``."""
-    stage = Stage(workspace, "verdict", after=_AFTER)
+    stage = Stage(workspace, "verdict", after=STAGES[: STAGES.index("verdict")])
     gates = collect(stage)
     if not stage.stopped_by:
         gates.append(package(stage))
