@@ -126,6 +126,17 @@ def _parser() -> argparse.ArgumentParser:
     model = commands.add_parser("model", help="build a head and helmet model by itself")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
     model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse", "medium", "fine"])
+    for piece, text in (
+        ("helmet", "classic, modern"),
+        ("facemask", "classic, modern, open, none"),
+        ("pads", "classic, modern"),
+        ("chinstrap", "low, high, two_point"),
+    ):
+        model.add_argument(
+            f"--{piece}",
+            metavar="NAME",
+            help=f"{text}, or a YAML file (default: the helmet's)",
+        )
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
 
@@ -310,7 +321,11 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             arguments.patch,
         ),
         "model": lambda: tools.write_model_file(
-            arguments.preset, arguments.resolution, arguments.out, arguments.preview
+            arguments.preset,
+            arguments.resolution,
+            (arguments.helmet, arguments.facemask, arguments.pads, arguments.chinstrap),
+            arguments.out,
+            arguments.preview,
         ),
         "solve": lambda: explicit.solve_model(
             arguments.model,

@@ -115,6 +115,7 @@ GOOD: dict[str, dict[str, Any]] = {
         "added_mass_part_share": 0.0,
         "min_time_step_s": 4e-7,
         "min_volume_ratio": 0.4,
+        "flow_residual": 1e-13,
     },
     "numerics_contact": {
         "contact_creation_share": 0.0,

@@ -16,7 +16,7 @@ from replay.models.radial import Ellipsoid, RadialSurfaces
 
 FLOORS = {
     # least scaled Jacobian, 1 %, mean, largest aspect ratio
-    "tiny": (0.45, 0.60, 0.88, 9.6),
+    "tiny": (0.45, 0.60, 0.88, 10.5),
     "coarse": (0.40, 0.65, 0.90, 9.0),
     "medium": (0.35, 0.65, 0.90, 9.0),
 }
@@ -117,21 +117,48 @@ def test_volume_of_layers_converges_with_second_order() -> None:
 
 def test_the_lower_edge_of_the_shell_has_no_stair_steps(coarse: Model) -> None:
     """Turning angles along the edge: below 35 degrees but for the corners that the coverage curve has itself."""
+    edge = max(edges_of_shell(coarse), key=len)
+    assert (
+        turning_deg(coarse.nodes[edge]) > 35
+    ).sum() == 4  # two concave corners at the brow, two convex under the flaps
+
+
+@pytest.mark.parametrize(("resolution", "sharpest_deg"), [("coarse", 86), ("medium", 68)])
+def test_the_shell_is_open_over_each_ear_with_round_corners(resolution: str, sharpest_deg: float) -> None:
+    model = build_model("nfl", resolution)
+    loops = sorted(edges_of_shell(model), key=len)
+    assert len(loops) == 3
+    for loop in loops[:2]:
+        points = model.nodes[loop]
+        size = np.ptp(points, axis=0)
+        assert 0.015 < size[0] < 0.045
+        assert 0.015 < size[2] < 0.045
+        assert turning_deg(points).max() < sharpest_deg  # a square's is 90
+        # over the ear point, as seen from the side
+        assert np.abs(points.mean(axis=0) - model.info["tragion_m"])[[0, 2]].max() < 0.025
+    np.testing.assert_allclose(*(np.abs(model.nodes[loop].mean(axis=0)) for loop in loops[:2]), atol=1e-8)
+
+
+def edges_of_shell(model: Model) -> list[list[int]]:
+    """Loops of nodes around the outer surface of the shell."""
     from replay.models.helmet_layout import boundary_edges
 
-    shell = coarse.hexes[coarse.elements_of(role="shell")]
-    edges = boundary_edges(shell[:, 4:])
+    edges = boundary_edges(model.hexes[model.elements_of(role="shell")][:, 4:])
     follow = {int(a): int(b) for a, b in edges}
-    path, node = [], int(edges[0, 0])
-    for _ in range(len(edges)):
-        path.append(node)
-        node = follow[node]
-    assert node == path[0], "the shell has more than one edge"
-    points = coarse.nodes[path]
+    loops = []
+    while follow:
+        loop = [next(iter(follow))]
+        while (node := follow.pop(loop[-1])) != loop[0]:
+            loop.append(node)
+        loops.append(loop)
+    return loops
+
+
+def turning_deg(points: np.ndarray) -> np.ndarray:
+    """Angle by which a closed line turns at each of its points [degrees]."""
     step = np.roll(points, -1, axis=0) - points
     step /= np.linalg.norm(step, axis=1)[:, None]
-    turn = np.degrees(np.arccos(np.clip(np.sum(step * np.roll(step, 1, axis=0), axis=1), -1, 1)))
-    assert (turn > 35).sum() == 4  # two concave corners at the brow, two convex ones under the flaps
+    return np.degrees(np.arccos(np.clip(np.sum(step * np.roll(step, 1, axis=0), axis=1), -1, 1)))
 
 
 def test_facemask_bars_keep_the_time_step_above_the_floor(model: Model) -> None:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from replay.models import Model, assembly_inspection, assembly_mass, build_model, helmet_inspection, parts_table
-from replay.models.build import PID_BLOCKS
 from replay.models.cubed_sphere import HEX_CORNERS, cube_lattice
 from replay.models.inspection import helmet_datum, mass_report, missing_interfaces, unconnected_parts
 from replay.models.mass import mass_properties, three_point_datum
 from replay.models.materials import CERTAINTIES, brain_parameters, load_materials, wave_speed_m_per_s
+from replay.models.numbering import PLAYERS
 from replay.models.ogrid import Resolution, head_mesh
 from replay.models.quality import (
     aspect_ratios,
@@ -146,7 +146,7 @@ def test_part_numbers_lie_in_the_articles_blocks_and_sets(model: Model) -> None:
     pids = [part.pid for part in model.parts]
     assert len(set(pids)) == len(pids)
     for part in model.parts:
-        low, high = PID_BLOCKS[part.assembly]
+        low, high = PLAYERS[1].of(part.assembly)
         assert low < part.pid <= high
     by_name = {part.name: part.pid for part in model.parts}
     assert by_name["scalp"] == 60009020

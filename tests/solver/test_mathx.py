@@ -41,6 +41,14 @@ def test_functions_that_vanish_at_zero_keep_their_digits(scale: float) -> None:
     assert mathx.expm1(0.0) == mathx.sinh(0.0) == mathx.log1p(0.0) == 0.0
 
 
+@pytest.mark.parametrize(("low", "high"), [(-300.0, 300.0), (-0.3, 0.3), (-1e-4, 1e-4)])
+def test_inverse_cube_root_is_right_to_two_ulps(low: float, high: float) -> None:
+    mpmath.mp.dps = 50
+    values = 10.0 ** np.linspace(low, high, 801)
+    assert max(ulps(mathx.inverse_cube_root(x), 1 / mpmath.cbrt(mpmath.mpf(float(x)))) for x in values) < 2.0
+    assert mathx.inverse_cube_root(1.0) == 1.0
+
+
 def test_exponential_stays_finite_beyond_its_range() -> None:
     assert mathx.exp(1e6) == pytest.approx(math.exp(709.0), rel=1e-12)
     assert 0.0 < mathx.exp(-1e6) < 1e-300

@@ -15,6 +15,7 @@ LEAVES = (
 )
 PLAYS = config["plays_folder"]
 TRACKS = ("clicks", "landmarks", "camera", "video", "kinematics")
+PIECES = ("helmet", "facemask", "pads", "chinstrap")
 _held = []
 
 
@@ -35,13 +36,13 @@ def code(*rooms):
 
 
 def play_files(wildcards):
-    """The tracks that the play's description names; what is wrong with it is the settings stage's to say."""
+    """The tracks, and the pieces of a helmet, that the play's description names; what is wrong with it is the settings stage's to say."""
     folder = Path(PLAYS) / wildcards.play
     try:
-        source = yaml.safe_load((folder / "play.yaml").read_text(encoding="utf-8"))[
-            "source"
-        ]
+        play = yaml.safe_load((folder / "play.yaml").read_text(encoding="utf-8"))
+        source, model = play["source"], play.get("model", {})
         names = [source[key] for key in TRACKS if isinstance(source.get(key), str)]
+        names += [model[key] for key in PIECES if isinstance(model.get(key), str)]
     except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
         return []
     return [(folder / name).as_posix() for name in names if (folder / name).is_file()]

@@ -4,6 +4,7 @@
 rule assemble:
     input:
         settings=stage("settings"),
+        inputs=stage("inputs"),
         code=code("stages/assemble.py", "stages/frame.py", "models", "gates"),
     output:
         stage("assembly"),

@@ -4,7 +4,7 @@
 rule settings:
     input:
         play=f"{PLAYS}/{{play}}/play.yaml",
-        code=code("stages/settings.py", "stages/frame.py", "gates"),
+        code=code("stages/settings.py", "stages/frame.py", "gates", "models"),
     output:
         stage("settings"),
     log:

@@ -20,6 +20,7 @@ RUN_CHECKS = (
     "added_mass_part_share",
     "min_time_step_s",
     "min_volume_ratio",
+    "flow_residual",
 )
 CONTACT_CHECKS = (
     "contact_creation_share",

@@ -122,7 +122,6 @@ class DamageRecorder:
             "now": np.full(k, porosity),
         }
         self._volumes = np.zeros(0)
-        self._residual = 0.0
         self._times: list[float] = []
         self._histories: list[NDArray[np.float64]] = []
 
@@ -143,7 +142,6 @@ class DamageRecorder:
             begun = np.isnan(self._onsets[j]) & (phi >= level)
             self._onsets[j][begun] = view.time_s
         self._last = {"f": f.copy(), "plastic": plastic, "now": phi}
-        self._residual = max(self._residual, float(view.variable("flow_residual")[self._rows].max()))
         self._times.append(float(view.time_s))
         self._histories.append(np.stack([self._summary(phi[at], self._volumes[at]) for at in self._groups.values()]))
 
@@ -159,7 +157,6 @@ class DamageRecorder:
             "w": self._w.copy(),
             "phi": self._phi.copy(),
             "onsets": self._onsets.copy(),
-            "residual": np.array([self._residual]),
             "times": np.array(self._times),
             "histories": np.array(self._histories).reshape(len(self._times), len(self._groups), -1),
             **{f"last_{name}": value.copy() for name, value in self._last.items()},
@@ -169,7 +166,6 @@ class DamageRecorder:
         """Go back to a state that `state` returned."""
         self._volumes = np.array(state["volumes"], dtype=float)
         self._w, self._phi, self._onsets = (np.array(state[name], dtype=float) for name in ("w", "phi", "onsets"))
-        self._residual = float(state["residual"][0])
         self._times = [float(t) for t in state["times"]]
         self._histories = [np.array(row) for row in state["histories"]]
         self._last = {name: np.array(state[f"last_{name}"], dtype=float) for name in self._last}
@@ -200,11 +196,6 @@ class DamageRecorder:
         for j, (name, factor, values) in enumerate(self._variants):
             rows.append([name, factor, values.get(name, math.nan), *self._summary(self._phi[j], self._volumes)[1:]])
         SENSITIVITY_TABLE.write(folder / "damage_sensitivity.csv", dict(zip(SENSITIVITY_TABLE.names, zip(*rows))))
-
-    @property
-    def flow_residual(self) -> float:
-        """Largest residual that a step of the law has left, over the stress."""
-        return self._residual
 
 
 def _strain_between(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -5,13 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from replay.models.build import build_model
-from replay.models.inspection import (
-    assembly_inspection,
-    assembly_mass,
-    helmet_inspection,
-    mass_report,
-    parts_outside_block,
-)
+from replay.models.helmet_design import HelmetDesign, load_design
+from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
 from replay.models.model import Model, Part, read_model, write_model
 from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
@@ -27,6 +22,7 @@ def write_preview(path: str | Path, model: Model) -> None:
 
 __all__ = [
     "PARTS",
+    "HelmetDesign",
     "Model",
     "Part",
     "assembly_inspection",
@@ -36,9 +32,9 @@ __all__ = [
     "brain_sets",
     "build_model",
     "helmet_inspection",
+    "load_design",
     "load_materials",
     "mass_report",
-    "parts_outside_block",
     "parts_table",
     "read_model",
     "select_assembly",

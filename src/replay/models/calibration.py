@@ -19,7 +19,6 @@ import numpy as np
 
 from replay.models.head_shape import HeadPreset
 from replay.models.mass import mass_properties
-from replay.models.materials import load_materials
 from replay.models.model import Part
 from replay.models.quality import hex_volumes
 
@@ -50,7 +49,7 @@ def calibrate_densities(
     parts: tuple[Part, ...],
     head: HeadPreset,
     helmet_mass_kg: float,
-    brain: str,
+    library: dict[str, dict[str, Any]],
 ) -> Calibration:
     """Find the density of every material.
 
@@ -64,10 +63,9 @@ def calibrate_densities(
         Masses and targets.
     helmet_mass_kg
         Of all helmet parts together.
-    brain
-        Law of the brain.
+    library
+        Materials by name, `load_materials` and those of the helmet's design.
     """
-    library = load_materials(brain)
     volume = np.bincount(element_part, weights=hex_volumes(nodes, hexes), minlength=len(parts))
     nominal = np.array([library[p.material]["density_kg_per_m3"] for p in parts])
     before = volume * nominal

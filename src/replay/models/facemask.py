@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from replay.models.facemask_design import BROW, Facemask
+from replay.models.helmet import standoff_m
+from replay.models.helmet_design import HelmetShell
 from replay.models.helmet_layout import angles_of, direction_at
 from replay.models.quality import hex_volumes
 from replay.models.radial import RadialSurface, Smoothed, ray_stretch
@@ -40,7 +42,12 @@ class FacemaskMesh:
 
 
 def facemask_mesh(
-    nodes: np.ndarray, edge_quads: np.ndarray, scalp: RadialSurface, helmet: dict[str, Any], step_m: float
+    nodes: np.ndarray,
+    edge_quads: np.ndarray,
+    scalp: RadialSurface,
+    shell: HelmetShell,
+    mask: Facemask,
+    step_m: float,
 ) -> FacemaskMesh:
     """Sweep the bars and join them to the shell.
 
@@ -52,37 +59,39 @@ def facemask_mesh(
         Faces of the shell's lower edge, (k, 4).
     scalp
         The scalp's surface.
-    helmet
-        ``data/helmet.yaml``.
+    shell, mask
+        The shell, and the bars before it.
     step_m
         Length aimed at for the hexes along a bar [m].
     """
-    mask = helmet["facemask"]
-    surface = _mask_surface(scalp, helmet)
+    surface = _mask_surface(scalp, shell, mask)
     mounts = _choose_mounts(nodes, edge_quads, mask)
-    centre = {name: _angles(nodes[quad].mean(axis=0)) for name, quad in mounts.items()}
-    inset = float(mask["mount_deg"])
-    columns = [float(mask["outer_column_azimuth_deg"]), centre["brow_left"][0]]
-    low = sorted(float(e) for e in mask["lower_bars_elevation_deg"])
-    rows = [*low, centre["side_low_left"][1], centre["side_high_left"][1]]
-    top = centre["brow_left"][1] - inset
-    ends = np.interp([*rows, top], rows[-2:], [centre["side_low_left"][0] - inset, centre["side_high_left"][0] - inset])
-    azimuth, elevation, bar_u, bar_v = _sheet(surface, columns, rows, top, ends, float(mask["bar_m"]), step_m)
-    points = _thickened(surface, azimuth, elevation, float(mask["bar_m"]))
+    place = {name: _angles(nodes[quad].mean(axis=0)) for name, quad in mounts.items() if name.endswith("_left")}
+    columns = _columns(mask, place)
+    rows = [
+        place[f"{row.mount}_left"][1] if row.elevation_deg is None else row.elevation_deg for row in mask.rows.values()
+    ]
+    flap = [place[f"{r.mount}_left"] for r in mask.rows.values() if r.mount is not None]
+    top = min(place[f"{name}_left"][1] for name in mask.mounts_at("brow")) - mask.mount_deg
+    ends = np.interp([*rows, top], [e for _, e in flap], [a - mask.mount_deg for a, _ in flap])
+    azimuth, elevation, bar_u, bar_v = _sheet(surface, [c.azimuth_deg for c in columns], rows, top, ends, mask, step_m)
+    points = _thickened(surface, azimuth, elevation, mask.bar_m)
     index = len(nodes) + np.arange(points.shape[0] * points.shape[1] * 2).reshape(points.shape[:3])
-    keep = _kept(bar_u, bar_v)
-    hexes = [_cell(index, i, j) for i, j in np.argwhere(keep)]
+    hexes = [_cell(index, i, j) for i, j in np.argwhere(_kept(bar_u, bar_v, columns, mask))]
     first_u = {number: i for i, number in reversed(list(enumerate(bar_u))) if number >= 0}
     first_v = {number: j for j, number in reversed(list(enumerate(bar_v))) if number >= 0}
     last_u, last_v = points.shape[0] - 1, points.shape[1] - 1
-    ends_of_bars = {
-        "brow_right": _face(index, (first_u[1], last_v), (first_u[1] + 1, last_v)),
-        "brow_left": _face(index, (first_u[2], last_v), (first_u[2] + 1, last_v)),
-        "side_low_right": _face(index, (0, first_v[2]), (0, first_v[2] + 1)),
-        "side_low_left": _face(index, (last_u, first_v[2]), (last_u, first_v[2] + 1)),
-        "side_high_right": _face(index, (0, first_v[3]), (0, first_v[3] + 1)),
-        "side_high_left": _face(index, (last_u, first_v[3]), (last_u, first_v[3] + 1)),
-    }
+    ends_of_bars = {}
+    for number, column in enumerate(columns):
+        if column.mount is not None:
+            side = "left" if column.azimuth_deg > 0 else "right"
+            face = _face(index, (first_u[number], last_v), (first_u[number] + 1, last_v))
+            ends_of_bars[f"{column.mount}_{side}"] = face
+    for number, row in enumerate(mask.rows.values()):
+        if row.mount is not None:
+            for side, u in (("left", last_u), ("right", 0)):
+                face = _face(index, (u, first_v[number]), (u, first_v[number] + 1))
+                ends_of_bars[f"{row.mount}_{side}"] = face
     everything = np.vstack([nodes, points.reshape(-1, 3)])
     hexes += [_join(everything, ends_of_bars[name], quad) for name, quad in mounts.items()]
     stacked = np.array(hexes)
@@ -91,21 +100,40 @@ def facemask_mesh(
     used = np.zeros(len(everything), dtype=bool)
     used[: len(nodes)] = True
     used[stacked] = True
-    number = np.cumsum(used) - 1
-    return FacemaskMesh(everything[used], number[stacked], {name: np.sort(quad) for name, quad in mounts.items()})
+    number_of = np.cumsum(used) - 1
+    return FacemaskMesh(everything[used], number_of[stacked], {name: np.sort(quad) for name, quad in mounts.items()})
 
 
-def _mask_surface(scalp: RadialSurface, helmet: dict[str, Any]) -> RadialSurface:
+@dataclass(frozen=True)
+class _Bar:
+    """One bar down the face: its azimuth [degrees], the mount above it, the rows it spans."""
+
+    azimuth_deg: float
+    mount: str | None
+    spans: tuple[tuple[str, str], ...]
+
+
+def _columns(mask: Facemask, place: dict[str, tuple[float, float]]) -> list[_Bar]:
+    """Every bar down the face, images included, from right to left."""
+    bars = []
+    for column in mask.columns:
+        azimuth = column.azimuth_deg if column.mount is None else place[f"{column.mount}_left"][0]
+        assert azimuth is not None
+        for sign in (-1, 1) if azimuth > 0 else (1,):
+            bars.append(_Bar(sign * float(azimuth), column.mount, column.spans))
+    return sorted(bars, key=lambda bar: bar.azimuth_deg)
+
+
+def _mask_surface(scalp: RadialSurface, shell: HelmetShell, mask: Facemask) -> RadialSurface:
     """Middle of the bars: the shell's middle surface continued over the face, a little further out in front."""
-    mask, thickness = helmet["facemask"], helmet["thickness_m"]
-    smooth = Smoothed(scalp, float(mask["smoothing_deg"]))
-    offset = thickness["comfort_pad"] + thickness["energy_pad"] + thickness["shell"] / 2
-    width = float(helmet["edge_deg"]["flap"][0][0])
+    smooth = Smoothed(scalp, mask.smoothing_deg)
+    width = shell.edge_deg.flap[0][0]
 
     def surface(directions: np.ndarray) -> np.ndarray:
         azimuth, _ = angles_of(directions)
         bulge = np.cos(np.pi / 2 * np.clip(azimuth / width, -1, 1)) ** 2
-        return smooth(directions) + ray_stretch(smooth, directions) * (offset + mask["standoff_m"] * bulge)
+        offset = standoff_m(shell, directions) + shell.shell_m / 2 + mask.standoff_m * bulge
+        return smooth(directions) + ray_stretch(smooth, directions) * offset
 
     return surface
 
@@ -115,21 +143,18 @@ def _angles(point: np.ndarray) -> tuple[float, float]:
     return float(azimuth[0]), float(elevation[0])
 
 
-def _choose_mounts(nodes: np.ndarray, edge_quads: np.ndarray, mask: dict[str, Any]) -> dict[str, np.ndarray]:
+def _choose_mounts(nodes: np.ndarray, edge_quads: np.ndarray, mask: Facemask) -> dict[str, np.ndarray]:
     """Faces of the shell's edge nearest to where the mounts should be; those of the right are mirror images."""
     middle = nodes[edge_quads].mean(axis=1)
     azimuth, elevation = angles_of(middle / np.sqrt(np.einsum("ij,ij->i", middle, middle))[:, None])
     along = nodes[edge_quads[:, 1]] - nodes[edge_quads[:, 0]]
     flat = np.abs(along[:, 2]) < np.sqrt(along[:, 0] ** 2 + along[:, 1] ** 2)
-    brow, flap = flat & (np.abs(azimuth) < 55) & (elevation > -15), ~flat & (np.abs(azimuth) < 90)
+    brow = flat & (np.abs(azimuth) < 55) & (elevation > -15)
+    flap = ~flat & (azimuth < 90) & (azimuth > 0)
     chosen = {}
-    high, low = mask["side_mount_elevation_deg"]
-    for name, where, distance in (
-        ("brow", brow, np.abs(azimuth - mask["brow_mount_azimuth_deg"])),
-        ("side_high", flap & (azimuth > 0), np.abs(elevation - high)),
-        ("side_low", flap & (azimuth > 0), np.abs(elevation - low)),
-    ):
-        left = int(np.argmin(np.where(where, np.round(distance, 6), np.inf)))
+    for name, mount in mask.mounts.items():
+        where, distance = (brow, azimuth) if mount.edge == "brow" else (flap, elevation)
+        left = int(np.argmin(np.where(where, np.round(np.abs(distance - mount.at_deg), 6), np.inf)))
         away = middle - middle[left] * [1, -1, 1]
         chosen[f"{name}_left"] = edge_quads[left]
         chosen[f"{name}_right"] = edge_quads[int(np.argmin(np.einsum("ij,ij->i", away, away)))]
@@ -142,29 +167,31 @@ def _sheet(
     rows: list[float],
     top: float,
     ends: np.ndarray,
-    bar_m: float,
+    mask: Facemask,
     step_m: float,
 ) -> tuple[np.ndarray, np.ndarray, list[int], list[int]]:
     """Azimuth and elevation of the sheet's points, and the bar of each interval (-1 between bars)."""
-    lines_u = [(None, 0)] + [(k, s) for k in range(4) for s in (-1, 1)] + [(None, 0)]
-    centre_u = [-columns[0], -columns[1], columns[1], columns[0]]
-    lines_v = [(k, s) for k in range(4) for s in (-1, 1)] + [(None, 0)]
+    lines_u = [(None, 0)] + [(k, s) for k in range(len(columns)) for s in (-1, 1)] + [(None, 0)]
+    lines_v = [(k, s) for k in range(len(rows)) for s in (-1, 1)] + [(None, 0)]
     shape = (len(lines_u), len(lines_v))
     azimuth, elevation = np.empty(shape), np.empty(shape)
     for j, (row, sign_v) in enumerate(lines_v):
         e0, end = (rows[row], ends[row]) if row is not None else (top, ends[-1])
         for i, (column, sign_u) in enumerate(lines_u):
-            a0 = centre_u[column] if column is not None else (-end if i == 0 else end)
+            a0 = columns[column] if column is not None else (-end if i == 0 else end)
             per_a, per_e = _metric(surface, a0, e0)
-            azimuth[i, j] = a0 + sign_u * bar_m / 2 / per_a
-            elevation[i, j] = e0 + sign_v * bar_m / 2 / per_e
+            azimuth[i, j] = a0 + sign_u * mask.bar_m / 2 / per_a
+            elevation[i, j] = e0 + sign_v * mask.bar_m / 2 / per_e
     bar_u = [-1 if a[0] is None or a[0] != b[0] else a[0] for a, b in pairwise(lines_u)]
     bar_v = [-1 if a[0] is None or a[0] != b[0] else a[0] for a, b in pairwise(lines_v)]
     # measured in the middle of an interval: at an end, left and right would differ
-    reach_u = [abs(b - a) * _metric(surface, (a + b) / 2, rows[2])[0] for a, b in pairwise(azimuth[:, 4].tolist())]
+    i, j = len(columns), 2 * (len(rows) // 2)
+    reach_u = [
+        abs(b - a) * _metric(surface, (a + b) / 2, rows[len(rows) // 2])[0] for a, b in pairwise(azimuth[:, j].tolist())
+    ]
     reach_v = [
-        abs(elevation[4, j + 1] - elevation[4, j]) * _metric(surface, azimuth[4, j], elevation[4, j])[1]
-        for j in range(len(bar_v))
+        abs(elevation[i, k + 1] - elevation[i, k]) * _metric(surface, azimuth[i, k], elevation[i, k])[1]
+        for k in range(len(bar_v))
     ]
     azimuth, elevation, bar_u = _refined(azimuth, elevation, bar_u, reach_u, step_m)
     right, left, bar_v = _refined(azimuth.T, elevation.T, bar_v, reach_v, step_m)
@@ -218,20 +245,21 @@ def _thickened(surface: RadialSurface, azimuth: np.ndarray, elevation: np.ndarra
     return np.stack([middle - normal * bar_m / 2, middle + normal * bar_m / 2], axis=2)
 
 
-def _kept(bar_u: list[int], bar_v: list[int]) -> np.ndarray:
-    """Cells that are bars: four rows, the columns between the lower three, and from the highest row to the brow."""
+def _kept(bar_u: list[int], bar_v: list[int], columns: list[_Bar], mask: Facemask) -> np.ndarray:
+    """Cells that are bars: rows from flap to flap or between their outermost columns, columns along their spans."""
     u, v = np.array(bar_u), np.array(bar_v)
-    first = [int(np.argmax(v == k)) for k in range(4)]
-    inner = np.arange(len(u))
-    inside = (inner >= np.argmax(u == 0)) & (inner <= np.argmax(u == 3))
+    names = list(mask.rows)
+    first = {name: int(np.argmax(v == k)) for k, name in enumerate(names)} | {BROW: len(v) - 1}
     keep = np.zeros((len(u), len(v)), dtype=bool)
-    for row in range(4):
-        keep[:, first[row]] = inside if row < 2 else True
-    rows = np.arange(len(v))
-    lower, upper = rows <= first[2], rows >= first[3]
-    between = (rows >= first[0]) & lower
-    for column in range(4):
-        keep[u == column] |= between | (upper if column in (1, 2) else np.zeros_like(upper))
+    crossing: dict[str, list[int]] = {name: [] for name in [*names, BROW]}
+    for number, column in enumerate(columns):
+        for span in column.spans:
+            keep[u == number, first[span[0]] : first[span[1]] + 1] = True
+            for name in mask.crossed(span):
+                crossing[name].append(int(np.argmax(u == number)))
+    for name, row in mask.rows.items():
+        low, high = (0, len(u) - 1) if row.mount else (min(crossing[name]), max(crossing[name]))
+        keep[low : high + 1, first[name]] = True
     return keep
 
 

@@ -26,8 +26,8 @@ class HeadPreset:
         Mass of the head [kg].
     part_mass_kg
         Masses that a source states for parts, by role [kg]; others follow from density and the head's mass.
-    helmet_mass_kg
-        Mass of the helmet that goes with it, unless a play says otherwise [kg].
+    helmet_size
+        Mass of a helmet of this head's size over that of the same helmet on the ``nfl`` head.
     least_thickness_m
         Least thickness of ``csf``, ``skull``, ``scalp`` [m].
     cg_from_tragion_m
@@ -41,7 +41,7 @@ class HeadPreset:
     surfaces: RadialSurfaces
     head_mass_kg: float
     part_mass_kg: dict[str, float]
-    helmet_mass_kg: float
+    helmet_size: float
     least_thickness_m: dict[str, float]
     cg_from_tragion_m: tuple[float, float, float]
     density_spread: float
@@ -102,7 +102,7 @@ def head_preset(name: str, divisions: int) -> HeadPreset:
         ),
         head_mass_kg=float(preset["head_mass_kg"]),
         part_mass_kg={key: float(value) for key, value in preset.get("part_mass_kg", {}).items()},
-        helmet_mass_kg=float(preset["helmet_mass_kg"]),
+        helmet_size=float(preset["helmet_mass_kg"]) / float(data["presets"]["nfl"]["helmet_mass_kg"]),
         least_thickness_m=least,
         cg_from_tragion_m=_triple(data["cg_from_tragion_m"]),
         density_spread=float(data["density_spread"]),

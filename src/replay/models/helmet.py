@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from replay.models.cubed_sphere import CubeLattice
-from replay.models.helmet_layout import PADS, HelmetLayout, boundary_edges
+from replay.models.helmet_design import HelmetDesign, HelmetShell
+from replay.models.helmet_layout import HelmetLayout, boundary_edges
 from replay.models.ogrid import HeadMesh, Resolution
 from replay.models.radial import RadialSurface, Smoothed, ray_stretch
 
@@ -35,9 +35,19 @@ class HelmetMesh:
     edge_quads: np.ndarray
 
 
-def helmet_surface(scalp: RadialSurface, helmet: dict[str, Any]) -> RadialSurface:
+def helmet_surface(scalp: RadialSurface, shell: HelmetShell) -> RadialSurface:
     """The smoothed scalp from which a helmet's layers are offset."""
-    return Smoothed(scalp, float(helmet["liner_smoothing_deg"]))
+    return Smoothed(scalp, shell.liner_smoothing_deg)
+
+
+def standoff_m(shell: HelmetShell, directions: np.ndarray) -> np.ndarray:
+    """Distance from the smoothed scalp to the shell along the normal in each direction, (n,) [m].
+
+    The squares of a direction's components weigh the values of front or back, side and crown: they sum to one.
+    """
+    along = np.where(directions[:, 0] > 0, shell.standoff_m.front, shell.standoff_m.back)
+    values = np.stack([along, np.full(len(along), shell.standoff_m.side), np.full(len(along), shell.standoff_m.crown)])
+    return np.einsum("ij,ji->i", directions**2, values)
 
 
 def helmet_mesh(
@@ -46,7 +56,7 @@ def helmet_mesh(
     head: HeadMesh,
     scalp: RadialSurface,
     resolution: Resolution,
-    helmet: dict[str, Any],
+    design: HelmetDesign,
     seat: str,
 ) -> HelmetMesh:
     """Stand pads and shell on the scalp.
@@ -63,45 +73,54 @@ def helmet_mesh(
         The scalp's surface.
     resolution
         Layers of comfort and energy pads.
-    helmet
-        ``data/helmet.yaml``.
+    design
+        Thicknesses and names.
     seat
         ``shared_nodes``: pads and chin cup stand on the scalp's nodes; ``contact``: each on nodes of its own there.
     """
     d = layout.directions
     skin = head.nodes[head.scalp_nodes]
-    thickness = helmet["thickness_m"]
-    liner = helmet_surface(scalp, helmet)
-    base = np.maximum(liner(d), np.sqrt(np.einsum("ij,ij->i", skin, skin)))
+    liner = helmet_surface(scalp, design.shell)
+    start = np.sqrt(np.einsum("ij,ij->i", skin, skin))
+    base = np.maximum(liner(d), start)
     stretch = ray_stretch(liner, d)
+    inside = base + stretch * standoff_m(design.shell, d)
+    comfort = base + stretch * _comfort_m(lattice, layout, design)
     builder = _Builder(head.nodes, lattice.quads)
     levels = [_sole(builder, head, seat)]
-    start = np.sqrt(np.einsum("ij,ij->i", skin, skin))
-    for name, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy), ("shell", 1)):
-        base = base + stretch * thickness[name]
+    outside = inside + stretch * design.shell.shell_m
+    for end, layers in ((comfort, resolution.comfort), (inside, resolution.energy), (outside, 1)):
         for step in range(1, layers + 1):
-            radius = start + (base - start) * (step / layers)
+            radius = start + (end - start) * (step / layers)
             levels.append(builder.level(d * radius[:, None]))
-        start = base
+        start = end
     level = 0
     padded = layout.pad >= 0
     for role, layers in (("comfort_pad", resolution.comfort), ("energy_pad", resolution.energy)):
-        names = np.array([f"{role}_{name}" for name in PADS])
+        names = np.array([f"{role}_{name}" for name in design.pads.pads])
         for _ in range(layers):
             builder.extrude(levels[level], levels[level + 1], padded, names[layout.pad[padded]])
             level += 1
     builder.extrude(levels[level], levels[level + 1], layout.shell, np.full(layout.shell.sum(), "shell"))
-    rim = boundary_edges(lattice.quads[layout.shell])
+    rim = boundary_edges(lattice.quads[layout.covered])
     inner, outer = levels[level], levels[level + 1]
     edge_quads = np.stack([inner[rim[:, 0]], inner[rim[:, 1]], outer[rim[:, 1]], outer[rim[:, 0]]], axis=1)
-    reach = ray_stretch(scalp, d) * helmet["chin"]["thickness_m"]
-    inside = _sole(builder, head, seat)
+    reach = ray_stretch(scalp, d) * design.chinstrap.cup.thickness_m
+    below = _sole(builder, head, seat)
     # two layers: one alone is sheared by hourglass modes
     for share in (0.5, 1.0):
-        outside = builder.level(skin + d * (share * reach)[:, None])
-        builder.extrude(inside, outside, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
-        inside = outside
+        above = builder.level(skin + d * (share * reach)[:, None])
+        builder.extrude(below, above, layout.chin, np.full(layout.chin.sum(), "chin_cup"))
+        below = above
     return builder.finish(edge_quads)
+
+
+def _comfort_m(lattice: CubeLattice, layout: HelmetLayout, design: HelmetDesign) -> np.ndarray:
+    """Thickness of the comfort pad at each surface point, (s,) [m]; no two pads share a point."""
+    thickness = np.full(len(layout.directions), min(pad.comfort_m for pad in design.pads.pads.values()))
+    for index, pad in enumerate(design.pads.pads.values()):
+        thickness[lattice.quads[layout.pad == index]] = pad.comfort_m
+    return thickness
 
 
 def _sole(builder: _Builder, head: HeadMesh, seat: str) -> np.ndarray:

@@ -7,15 +7,15 @@ the coverage curve: the edge has no stair steps, and every surface of head and h
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from replay.models.cubed_sphere import CubeLattice
+from replay.models.helmet_design import Cup, HelmetDesign, HelmetShell, Opening, PadSet
 
-PADS = ("crown", "front", "back", "side_left", "side_right", "jaw_left", "jaw_right")
+_FACES = {"front": (0, 1), "back": (0, -1), "left": (1, 1), "right": (1, -1), "crown": (2, 1)}
 
 
 @dataclass(frozen=True)
@@ -24,28 +24,34 @@ class HelmetLayout:
 
     Parameters
     ----------
+    covered
+        Mask of the surface quads within the shell's edge, (q,) bool.
     shell
-        Mask of the surface quads, (q,) bool.
+        Those of them that are not left open over the ears, (q,) bool.
     pad
-        Index into `PADS` of each quad, -1 where there is none, (q,).
+        Index into the pads of the design of each quad, -1 where there is none, (q,).
     chin
         Mask of the quads of the chin cup, (q,) bool.
     directions
         The bent directions, (s, 3).
     """
 
+    covered: np.ndarray
     shell: np.ndarray
     pad: np.ndarray
     chin: np.ndarray
     directions: np.ndarray
 
 
-def helmet_layout(lattice: CubeLattice, helmet: dict[str, Any]) -> HelmetLayout:
-    """Lay the helmet of ``data/helmet.yaml`` on a lattice."""
-    shell = _covered(lattice.quad_centres, helmet["coverage"])
-    directions = _bent(lattice, shell, helmet)
-    pad = np.where(shell, _pad_zones(lattice, helmet), -1)
-    return HelmetLayout(shell, pad, _chin(lattice, helmet["chin"]), directions)
+def helmet_layout(lattice: CubeLattice, design: HelmetDesign) -> HelmetLayout:
+    """Lay a helmet on a lattice."""
+    covered = _covered(lattice.quad_centres, design.shell)
+    directions = _bent(lattice, covered, design.shell)
+    open_ear = _opening(lattice, covered, design.shell.ear)
+    if open_ear.any():
+        directions = _rounded(lattice, open_ear, directions, covered)
+    pad = np.where(covered & ~open_ear, _pad_zones(lattice, design.pads), -1)
+    return HelmetLayout(covered, covered & ~open_ear, pad, _chin(lattice, design.chinstrap.cup), directions)
 
 
 def angles_of(directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -68,68 +74,96 @@ def boundary_edges(quads: np.ndarray) -> np.ndarray:
     return edges[np.sort(first[count == 1])]
 
 
-def _covered(centres: np.ndarray, coverage: dict[str, float]) -> np.ndarray:
+def _covered(centres: np.ndarray, shell: HelmetShell) -> np.ndarray:
     x, y, z = centres.T
     top, bottom = z == 1, z == -1
-    front = (x == 1) | ((np.abs(y) == 1) & (x > coverage["flap_front"]))
-    return top | (~bottom & np.where(front, z > coverage["brow"], z > coverage["bottom"]))
+    front = (x == 1) | ((np.abs(y) == 1) & (x > shell.coverage.flap_front))
+    return top | (~bottom & np.where(front, z > shell.coverage.brow, z > shell.coverage.bottom))
 
 
-def _pad_zones(lattice: CubeLattice, helmet: dict[str, Any]) -> np.ndarray:
-    x, y, z = lattice.quad_centres.T
-    zones = helmet["zones"]
-    free = 1 - max(2 / lattice.divisions, helmet["gap_width"])
-    side = (np.abs(y) == 1) & (np.abs(x) < free)
-    upper = side & (z > zones["side_above"])
-    jaw = side & (z < zones["jaw_below"]) & (x > zones["jaw_before"])
-    chosen = {
-        "crown": (z == 1) & (np.abs(x) < free) & (np.abs(y) < free),
-        "front": x == 1,
-        "back": x == -1,
-        "side_left": upper & (y > 0),
-        "side_right": upper & (y < 0),
-        "jaw_left": jaw & (y > 0),
-        "jaw_right": jaw & (y < 0),
-    }
-    pad = np.full(len(x), -1)
-    for index, name in enumerate(PADS):
-        pad[chosen[name]] = index
+def _pad_zones(lattice: CubeLattice, pads: PadSet) -> np.ndarray:
+    """Pad of each quad; of two that would share a node the later one gives way."""
+    centres = lattice.quad_centres
+    pad, taken = np.full(len(centres), -1), np.zeros(len(lattice.surface), dtype=bool)
+    for index, zone in enumerate(pads.pads.values()):
+        axis, end = _FACES[zone.face]
+        here = centres[:, axis] == end
+        for value, (low, high) in zip(centres.T, (zone.x, zone.y, zone.z)):
+            here &= (value >= low) & (value <= high)
+        here &= ~taken[lattice.quads].any(axis=1)
+        pad[here] = index
+        taken[lattice.quads[here]] = True
     return pad
 
 
-def _chin(lattice: CubeLattice, chin: dict[str, float]) -> np.ndarray:
+def _opening(lattice: CubeLattice, covered: np.ndarray, ear: Opening | None) -> np.ndarray:
+    """Quads of the openings over the ears; none on a lattice too coarse to close below them."""
     x, y, z = lattice.quad_centres.T
-    front, bottom = (x == 1) & (z < chin["front_below"]), (z == -1) & (x > chin["bottom_before"])
-    return (front | bottom) & (np.abs(y) < chin["half_width"])
+    if ear is None:
+        return np.zeros(len(x), dtype=bool)
+    chosen = (np.abs(y) == 1) & (x >= ear.x[0]) & (x <= ear.x[1]) & (z >= ear.z[0]) & (z <= ear.z[1])
+    at_edge = np.zeros(len(lattice.surface), dtype=bool)
+    at_edge[boundary_edges(lattice.quads[covered])] = True
+    return chosen & ~at_edge[lattice.quads[chosen]].any()
 
 
-def _bent(lattice: CubeLattice, shell: np.ndarray, helmet: dict[str, Any]) -> np.ndarray:
+def _chin(lattice: CubeLattice, cup: Cup) -> np.ndarray:
+    x, y, z = lattice.quad_centres.T
+    front, bottom = (x == 1) & (z < cup.front_below), (z == -1) & (x > cup.bottom_before)
+    return (front | bottom) & (np.abs(y) < cup.half_width)
+
+
+def _bent(lattice: CubeLattice, covered: np.ndarray, shell: HelmetShell) -> np.ndarray:
     """Directions moved so that the shell's boundary lies on the coverage curve, everything else following smoothly."""
-    edges = boundary_edges(lattice.quads[shell])
-    path = np.unique(edges)
-    target = _edge_targets(lattice.surface_cube[path], lattice.directions[path], helmet)
-    count = len(lattice.directions)
+    path = np.unique(boundary_edges(lattice.quads[covered]))
+    target = _edge_targets(lattice.surface_cube[path], lattice.directions[path], shell)
+    return _following(lattice, lattice.directions, path, target, shell.edge_decay_deg)
+
+
+def _rounded(lattice: CubeLattice, ear: np.ndarray, directions: np.ndarray, covered: np.ndarray) -> np.ndarray:
+    """Directions moved so that the openings over the ears have round corners; the shell's edge stays."""
+    edge = np.unique(boundary_edges(lattice.quads[covered]))
+    left = ear & (lattice.quad_centres[:, 1] == 1)
+    rim = np.unique(boundary_edges(lattice.quads[left]))
+    place = lattice.surface_cube[rim][:, [0, 2]]
+    low, high = place.min(axis=0), place.max(axis=0)
+    across = (2 * place - low - high) / (high - low)
+    # a superellipse of the fourth order through the middles of the sides: corners move inwards by a sixth
+    share = (across**4).sum(axis=1) ** -0.25
+    middle = _unit(directions[rim].mean(axis=0)[None])
+    target = _unit(middle + share[:, None] * (directions[rim] - middle))
+    mirror = lattice.mirrored()
+    path = np.concatenate([edge, rim, mirror[rim]])
+    targets = np.vstack([directions[edge], target, target * [1, -1, 1]])
+    return _following(lattice, directions, path, targets, 0.0)
+
+
+def _following(
+    lattice: CubeLattice, directions: np.ndarray, path: np.ndarray, target: np.ndarray, decay_deg: float
+) -> np.ndarray:
+    """Directions of which some move to a target, the others following over an angle, or 1.5 cells; left as right."""
+    decay_cells = max(1.5, decay_deg * lattice.divisions / 90)
+    count = len(directions)
     sides = np.sort(np.stack([lattice.quads, np.roll(lattice.quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     sides = np.unique(sides, axis=0)
     ones = np.ones(2 * len(sides))
     rows, columns = np.concatenate([sides[:, 0], sides[:, 1]]), np.concatenate([sides[:, 1], sides[:, 0]])
     graph = sparse.csr_matrix((ones, (rows, columns)), shape=(count, count))
-    decay = float(helmet["edge_decay_cells"]) ** -2
-    matrix = sparse.diags(np.asarray(graph.sum(axis=1)).ravel() + decay) - graph
+    matrix = sparse.diags(np.asarray(graph.sum(axis=1)).ravel() + decay_cells**-2) - graph
     free = np.setdiff1d(np.arange(count), path)
     moved = np.zeros((count, 3))
-    moved[path] = target - lattice.directions[path]
+    moved[path] = target - directions[path]
     block = matrix[free].tocsc()
     right = -(block[:, path] @ moved[path])
     moved[free] = np.stack([spsolve(block[:, free], right[:, k]) for k in range(3)], axis=1)
-    bent = _unit(lattice.directions + moved)
+    bent = _unit(directions + moved)
     mirror = lattice.mirrored()
     return _unit((bent + bent[mirror] * [1, -1, 1]) / 2)
 
 
-def _edge_targets(cube: np.ndarray, directions: np.ndarray, helmet: dict[str, Any]) -> np.ndarray:
+def _edge_targets(cube: np.ndarray, directions: np.ndarray, shell: HelmetShell) -> np.ndarray:
     """Where each point of the edge path belongs: by azimuth on brow and bottom, by elevation on the flap's front."""
-    curves = {name: np.array(points) for name, points in helmet["edge_deg"].items()}
+    curves = {name: np.array(getattr(shell.edge_deg, name)) for name in ("brow", "flap", "bottom")}
     azimuth, elevation = angles_of(directions)
     side = np.where(azimuth < 0, -1.0, 1.0)
     azimuth = np.abs(azimuth)

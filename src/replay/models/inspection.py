@@ -6,18 +6,31 @@ from typing import Any
 
 import numpy as np
 
-from replay.models.build import PID_BLOCKS
 from replay.models.mass import Datum, MassProperties, mass_properties, three_point_datum
 from replay.models.model import Model
+from replay.models.numbering import PLAYERS, Blocks
 from replay.models.quality import hex_volumes, scaled_jacobians
 
-PAD_SETS = ("H1_pads_set1", "H1_pads_set2")
-FRICTION_PAIRS = ((60009020, "H1_pads_set1", 1), (60009020, "H1_pads_set2", 1), (60009020, "chin_cup", 2))
-"""Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
+SKIN = 9020
+"""Part number of the skin within a head's block."""
+_MOUNTS = ("brow", "side_high", "side_low")
+_STRAPS = ("front", "rear")
+
+
+def blocks_of(model: Model) -> Blocks:
+    """Blocks of numbers of the player whose head and helmet a model is."""
+    return PLAYERS[model.info.get("player", 1)]
+
+
+def friction_pairs(model: Model) -> tuple[tuple[int, str, int], ...]:
+    """Head-side part, helmet-side set or part, friction type: the article's step 3.2."""
+    blocks = blocks_of(model)
+    skin, (comfort, energy) = blocks.head + SKIN, blocks.pad_sets
+    return (skin, comfort, 1), (skin, energy, 1), (skin, "chin_cup", 2)
 
 
 def assembly_mass(
-    model: Model, assembly: str | None = None, *, name: str | None = None, player: str | None = None
+    model: Model, assembly: str | None = None, *, name: str | None = None, player: int | None = None
 ) -> MassProperties:
     """Mass properties of an assembly, of one part by name, or of everything.
 
@@ -30,7 +43,7 @@ def assembly_mass(
     name
         Name of one part.
     player
-        ``struck`` or ``impactor``.
+        1, the struck one, or 2.
     """
     chosen = model.elements_of(assembly=assembly, player=player)
     if name is not None:
@@ -120,7 +133,7 @@ def helmet_inspection(model: Model, *, helmet_cg_in_datum_m: np.ndarray | None =
 
 def missing_interfaces(model: Model) -> list[str]:
     """Name every interface of the article's step 1.5 that the model lacks: pads, pad-pad, mounts, strap anchors."""
-    missing = [name for name in PAD_SETS if not model.part_sets.get(name)]
+    missing = [name for name in blocks_of(model).pad_sets if not model.part_sets.get(name)]
     names = {part.name: k for k, part in enumerate(model.parts)}
     for name, k in names.items():
         if name.startswith("comfort_pad_"):
@@ -129,13 +142,15 @@ def missing_interfaces(model: Model) -> list[str]:
                 missing.append(f"pad-pad {name}")
         elif name.startswith("energy_pad_") and ("shell" not in names or not len(_shared(model, k, names["shell"]))):
             missing.append(f"pad-shell {name}")
-    for place in ("brow", "side_high", "side_low"):
+    worn = model.info.get("helmet", {})
+    mask, strap = worn.get("facemask", {"mounts": _MOUNTS}), worn.get("chinstrap", {"straps": _STRAPS})
+    for place in mask["mounts"] if mask else ():
         missing += [
             f"facemask mount {place} {side}"
             for side in ("left", "right")
             if not len(model.node_sets.get(f"facemask_mount_{place}_{side}", ()))
         ]
-    for anchor in ("strap_anchor_front", "strap_anchor_rear", "chin_cup_strap"):
+    for anchor in (*(f"strap_anchor_{name}" for name in strap["straps"]), "chin_cup_strap"):
         missing += [
             f"{anchor} {side}" for side in ("left", "right") if not len(model.node_sets.get(f"{anchor}_{side}", ()))
         ]
@@ -160,11 +175,12 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    outside = parts_outside_block(model)
+    blocks = {name: blocks_of(model).of(name) for name in ("head", "helmet")}
+    outside = [p.name for p in model.parts if not blocks[p.assembly][0] < p.pid <= blocks[p.assembly][1]]
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"
-        for pid, other, _ in FRICTION_PAIRS
+        for pid, other, _ in friction_pairs(model)
         if pid not in pids or not (model.part_sets.get(other) or other in {part.name for part in model.parts})
     ]
     mass: float | str = "no mass of the physical helmet is given"
@@ -185,16 +201,6 @@ def assembly_inspection(
         "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
-
-
-def parts_outside_block(model: Model) -> list[str]:
-    """Names of the parts whose number lies outside the block of their player's assembly (protocol 1.6)."""
-    outside = []
-    for part in model.parts:
-        low, high = PID_BLOCKS[part.assembly if part.player == "struck" else f"impactor_{part.assembly}"]
-        if not low < part.pid <= high:
-            outside.append(part.name)
-    return outside
 
 
 def unconnected_parts(model: Model) -> list[str]:

@@ -121,7 +121,7 @@ class Play(Setting):
     @property
     def files(self) -> tuple[Path, ...]:
         """Every raw file the play names, in a fixed order."""
-        return tuple(self.file(name) for name in self.source.files)
+        return tuple(self.file(name) for name in (*self.source.files, *self.model.files))
 
     @field_validator("withhold")
     @classmethod

@@ -15,7 +15,8 @@ Positive = Annotated[Number, Field(gt=0)]
 NotNegative = Annotated[Number, Field(ge=0)]
 
 
-def _existing(name: str, info: ValidationInfo) -> str:
+def existing_file(name: str, info: ValidationInfo) -> str:
+    """Refuse a name that is no file in the play's folder."""
     folder = (info.context or {}).get("folder")
     if folder is None or (Path(folder) / name).is_file():
         return name
@@ -26,7 +27,7 @@ def _existing(name: str, info: ValidationInfo) -> str:
     )
 
 
-InputFile = Annotated[str, Field(min_length=1), AfterValidator(_existing)]
+InputFile = Annotated[str, Field(min_length=1), AfterValidator(existing_file)]
 
 
 def _unit_quaternion(value: tuple[float, float, float, float]) -> tuple[float, float, float, float]:

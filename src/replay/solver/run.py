@@ -52,6 +52,8 @@ class RunSummary:
         Over all history times [s].
     min_volume_ratio
         Smallest V / V0 of a deformable element at history times.
+    flow_residual
+        The most that a step left of the flow equation that a law solves, over its stress; None where no law does.
     added_mass_kg, added_mass_by_part_kg
         Mass scaling, in all and by part name [kg].
     mass_kg
@@ -77,6 +79,7 @@ class RunSummary:
     steps: int
     smallest_time_step_s: float
     min_volume_ratio: float
+    flow_residual: float | None
     added_mass_kg: float
     added_mass_by_part_kg: dict[str, float]
     mass_kg: float
@@ -255,6 +258,7 @@ class _Run:
             steps=integrator.step,
             smallest_time_step_s=float(self.smallest[0]),
             min_volume_ratio=float(self.smallest[1]),
+            flow_residual=_flow_residual(integrator),
             added_mass_kg=integrator.added_mass.total_kg,
             added_mass_by_part_kg=dict(zip(names, integrator.added_mass.by_part_kg.tolist())),
             mass_kg=float(mass.sum()),
@@ -277,6 +281,11 @@ class _Run:
         if view.time_s > self._last_state_s:
             self.states.append(view)
         self.finish(str(error))
+
+
+def _flow_residual(integrator: Integrator) -> float | None:
+    kept = [values for group in integrator.groups if (values := group.variable("flow_residual")) is not None]
+    return max((float(values.max()) for values in kept), default=None)
 
 
 def state_hash(integrator: Integrator) -> str:

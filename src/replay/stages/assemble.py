@@ -27,10 +27,14 @@ def run(workspace: Workspace) -> str | None:
     stage = Stage(workspace, "assembly", after=["settings"])
     play = read_settings(stage)
     limits = limits_of(stage)
+    for file in play.model.files:
+        stage.follow("inputs")
+        stage.read("inputs", file)
     model = models.build_model(
         play.model.preset,
         play.model.resolution,
         helmet_mass_kg=play.helmet.mass_kg,
+        design=models.load_design(*play.model.helmet_pieces, folder=play.folder),
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
         seat=play.model.helmet_seat,

@@ -53,10 +53,11 @@ def solve_model(model: Path, controls: Path, out: Path, *, threads: int | None =
             summary = solve(task.problem, out, recorders=task.recorders, threads=threads, resume=not anew)
     low, high = summary.energy_ratio_range
     energies = summary.energies
+    flow = "" if summary.flow_residual is None else f", flow residual {summary.flow_residual:.1e}"
     print(
         f"{model}: {1e3 * summary.time_s:.6g} ms in {summary.steps} steps, energy ratio {low:.5f} to {high:.5f}\n"
         f"    kinetic {energies['kinetic_J']:.6g} J, internal {energies['internal_J']:.6g} J, "
-        f"hourglass {energies['hourglass_J']:.6g} J, added mass {summary.added_mass_kg:.3g} kg\n"
+        f"hourglass {energies['hourglass_J']:.6g} J, added mass {summary.added_mass_kg:.3g} kg{flow}\n"
         f"    results: {out}"
     )
     return 0

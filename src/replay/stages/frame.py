@@ -94,6 +94,10 @@ class Stage:
         """Refuse a second writer."""
         self._held = hold_folder(self.folder, "this stage")
 
+    def follow(self, stage: str) -> None:
+        """Let this stage read one more stage's files, which only an earlier one's show to be needed."""
+        self._before.setdefault(stage, check_stage(self.workspace, stage))
+
     @property
     def stopped_by(self) -> str | None:
         """Why an earlier stage ended the play, or None."""

@@ -183,10 +183,12 @@ def run_numbers(summary: dict) -> dict[str, float | str]:
     added, mass = summary["added_mass_by_part_kg"], summary["mass_by_part_kg"]
     share = {name: added[name] / mass[name] for name in mass if mass[name] > 0}
     worst = max(share, key=lambda name: share[name])
+    flow = summary["flow_residual"]
     return {
         "added_mass_share": summary["added_mass_kg"] / summary["mass_kg"],
         "added_mass_part_share": share[worst],
         "added_mass_part_share_detail": f"most in {worst}" if share[worst] > 0 else "",
         "min_time_step_s": summary["smallest_time_step_s"],
         "min_volume_ratio": summary["min_volume_ratio"],
+        "flow_residual": "no law of this run solves a flow equation" if flow is None else flow,
     }

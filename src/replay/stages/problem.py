@@ -94,25 +94,19 @@ def contact_controls(model: Model, contact: Contact, more: tuple[ContactPair, ..
     )
 
 
-def chin_straps(model: Model, prefix: str = "") -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
-    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them.
-
-    `prefix` stands before the names of the player's node sets.
-    """
+def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
+    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
     if not seated_by_contact(model):
         return (), ()
-    sets = {name.removeprefix(prefix): rows for name, rows in model.node_sets.items() if name.startswith(prefix)}
-    data = model.info["strap"]
+    sets, data = model.node_sets, model.info["strap"]
     straps = []
-    for side in ("left", "right"):
-        for end in ("front", "rear"):
-            cup, anchor = sets.get(f"chin_cup_strap_{side}"), sets.get(f"strap_anchor_{end}_{side}")
-            if cup is not None and anchor is not None:
-                rows = np.array([anchor[0], cup[0]], np.int64)
-                straps.append(
-                    Strap(f"{prefix}chin_{end}_{side}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"])
-                )
-    shell = (RigidSet(f"{prefix}chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
+    for name in sorted(sets):
+        place = name.removeprefix("strap_anchor_")
+        cup = sets.get(f"chin_cup_strap_{place.rpartition('_')[2]}")
+        if place != name and cup is not None:
+            rows = np.array([sets[name][0], cup[0]], np.int64)
+            straps.append(Strap(f"chin_{place}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
+    shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
     return shell, tuple(straps)
 
 

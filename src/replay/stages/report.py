@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -87,7 +88,7 @@ def collect(stage: Stage) -> ReportInput:
     quality = read_json(stage.read("reconstruction", "quality.json"))
     model = replayed_model(stage)
     known: dict[str, Any] = {
-        "play": _play_facts(play, quality, inputs),
+        "play": _play_facts(play, quality, model.info["helmet"]["chosen"]),
         "verdict": read_json(stage.read("verdict", "verdict.json")),
         "gates": _gates(stage, limits),
         "gate_facts": {
@@ -176,7 +177,8 @@ def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:
     return pd.read_csv(stage.read(name, file))
 
 
-def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> dict[str, Any]:
+def _play_facts(play: Play, quality: dict[str, Any], worn: Mapping[str, str]) -> dict[str, Any]:
+    weight = "not weighed" if play.helmet.mass_kg is None else f"{play.helmet.mass_kg:g} kg"
     return {
         "name": play.name,
         "title": play.title,
@@ -185,7 +187,8 @@ def _play_facts(play: Play, quality: dict[str, Any], inputs: dict[str, Any]) -> 
         "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
         "t0": f"{1e3 * quality['driving_t0_s']:.1f} ms (peak {play.t0} acceleration)",
         "window": f"{1e3 * play.window.duration_s:g} ms from {1e3 * play.window.before_t0_s:g} ms before t0",
-        "helmet": f"{play.helmet.model}, {play.helmet.mass_kg:g} kg",
+        "helmet": f"{play.helmet.model}, {weight}",
+        "finite-element helmet": ", ".join(f"{name} {value}" for name, value in worn.items()),
         "model": f"{play.model.preset}, {play.model.resolution}",
     }
 

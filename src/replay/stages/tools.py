@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -155,9 +156,12 @@ def digitise_video(
     return 0
 
 
-def write_model_file(preset: str, resolution: str, out: Path, preview: Path | None) -> int:
-    """Build a model by itself, print its tables and write it."""
-    model = models.build_model(preset, resolution)
+def write_model_file(
+    preset: str, resolution: str, pieces: Sequence[str | None], out: Path, preview: Path | None
+) -> int:
+    """Build a model by itself, print its tables and write it; files of its helmet's pieces are found from here."""
+    helmet, *others = pieces
+    model = models.build_model(preset, resolution, design=models.load_design(helmet or "classic", *others))
     models.write_model(out, model)
     print(models.summary_text(model))
     if preview is not None:

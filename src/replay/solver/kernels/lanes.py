@@ -49,6 +49,8 @@ STATE_SIZE: int
 N_REFERENCE: int
 N_PARAMETERS: int
 physics: Callable[..., Any]
+again: Callable[..., Any]
+HAS_SMALL_UPDATE: bool
 run_block: Callable[..., None]
 
 # sizes of a block's stack arrays: the compiler wants names, not products
@@ -135,6 +137,55 @@ else:
         return types.void(array, types.intp, types.intp, values), build
 
 
+@device
+def keep(out, after, extra, lane, answer):
+    """Put what `element` returned for a lane into the block's stack arrays."""
+    fx, fy, fz, stress, hourglass, state, step, work = answer
+    store(out, lane, LANES, fx)
+    store(out, 8 * LANES + lane, LANES, fy)
+    store(out, 16 * LANES + lane, LANES, fz)
+    store(out, 24 * LANES + lane, LANES, stress)
+    store(out, 30 * LANES + lane, LANES, hourglass[0])
+    store(out, 33 * LANES + lane, LANES, hourglass[1])
+    store(out, 36 * LANES + lane, LANES, hourglass[2])
+    store(out, 39 * LANES + lane, LANES, hourglass[3])
+    store(after, lane, LANES, state)
+    store(extra, lane, LANES, (step,))
+    store(extra, LANES + lane, LANES, work)
+
+
+def one_element(
+    block, lane, nodal, connectivity, mass, reference, stress, hourglass, state, p, control, dt
+):  # fmt: skip
+    """Answer of one lane by the law's `update`, from the block's arrays as they were before the step.
+
+    Compiled by itself and told nothing of the block's stack arrays, so that their loop stays packed.
+    """
+    corner = stack(48)
+    for a in range(8):
+        node = connectivity[block, a, lane]
+        for k in range(3):
+            corner[k * 8 + a] = nodal[node, POSITION + k]
+            corner[24 + k * 8 + a] = nodal[node, VELOCITY + k]
+    q = load(hourglass, block * 12 * LANES + lane, LANES, 12)
+    return physics(
+        load(corner, 0, 1, 8),
+        load(corner, 8, 1, 8),
+        load(corner, 16, 1, 8),
+        load(corner, 24, 1, 8),
+        load(corner, 32, 1, 8),
+        load(corner, 40, 1, 8),
+        load(mass, block * LANES + lane, LANES, 1)[0],
+        load(reference, block * N_REFERENCE * LANES + lane, LANES, N_REFERENCE),
+        load(stress, block * 6 * LANES + lane, LANES, 6),
+        ((q[0], q[1], q[2]), (q[3], q[4], q[5]), (q[6], q[7], q[8]), (q[9], q[10], q[11])),
+        load(state, block * N_STATE * LANES + lane, LANES, N_STATE),
+        dt,
+        p,
+        control,
+    )
+
+
 def block_forces(
     block, fill, first_row, nodal, connectivity, place, mass, reference, stress, hourglass, state, parameters, part,
     control, dt, force, step, work,
@@ -153,7 +204,7 @@ def block_forces(
     p = load(parameters, part * N_PARAMETERS, 1, N_PARAMETERS)
     for lane in range(LANES):
         q = load(hourglass, block * 12 * LANES + lane, LANES, 12)
-        fx, fy, fz, s, h, now, dte, energy = physics(
+        answer = physics(
             load(corner, lane, LANES, 8),
             load(corner, 8 * LANES + lane, LANES, 8),
             load(corner, 16 * LANES + lane, LANES, 8),
@@ -169,17 +220,15 @@ def block_forces(
             p,
             control,
         )
-        store(out, lane, LANES, fx)
-        store(out, 8 * LANES + lane, LANES, fy)
-        store(out, 16 * LANES + lane, LANES, fz)
-        store(out, 24 * LANES + lane, LANES, s)
-        store(out, 30 * LANES + lane, LANES, h[0])
-        store(out, 33 * LANES + lane, LANES, h[1])
-        store(out, 36 * LANES + lane, LANES, h[2])
-        store(out, 39 * LANES + lane, LANES, h[3])
-        store(after, lane, LANES, now)
-        store(extra, lane, LANES, (dte,))
-        store(extra, LANES + lane, LANES, energy)
+        keep(out, after, extra, lane, answer)
+    if HAS_SMALL_UPDATE:
+        for lane in range(LANES):
+            # a comparison with a value that is not a number is false
+            if not after[(N_STATE - 1) * LANES + lane] >= 0.0:
+                answer = again(
+                    block, lane, nodal, connectivity, mass, reference, stress, hourglass, state, p, control, dt
+                )
+                keep(out, after, extra, lane, answer)
     for a in range(8):
         for lane in range(fill):
             row = first_row + place[block, a, lane]
@@ -273,20 +322,26 @@ def compile_law(law: Any) -> Any:
     """Compile `law_forces` for one material law (a module of `materials`).
 
     The lane loop stays a function of its own inside the parallel loop, so that it is
-    optimised once, alone.
+    optimised once, alone. Where the law has a `small_update` the loop runs that, and then `update` for the lanes
+    whose step it did not hold for: an element's result depends on nothing but the element.
     """
+    alone = numba.njit(nogil=True, error_model="numpy")
     kind = total_deformation if law.TOTAL_FORM else no_deformation
     hold = yielding_hourglass if getattr(law, "HOURGLASS_YIELDS", False) else elastic_hourglass
-    sizes = {
+    sizes: dict[str, Any] = {
         "N_STATE": state_size(law),
         "STATE_SIZE": state_size(law) * LANES,
         "N_REFERENCE": reference_size(law),
         "N_PARAMETERS": law.N_CONSTANTS,
     }
-    physics = device(specialise(element, f"element_{law.NAME}", update=law.update, deformation=kind, hold=hold))
-    block = numba.njit(nogil=True, error_model="numpy")(
-        specialise(block_forces, f"block_forces_{law.NAME}", physics=physics, **sizes)
-    )
+    small = getattr(law, "small_update", None)
+    kinds = {"deformation": kind, "hold": hold}
+    physics = device(specialise(element, f"element_{law.NAME}", update=law.update, **kinds))
+    sizes["again"] = alone(specialise(one_element, f"one_element_{law.NAME}", physics=physics, **sizes))
+    sizes["HAS_SMALL_UPDATE"] = small is not None
+    if small is not None:
+        physics = device(specialise(element, f"small_element_{law.NAME}", update=small, **kinds))
+    block = alone(specialise(block_forces, f"block_forces_{law.NAME}", physics=physics, **sizes))
     return compiled(specialise(law_forces, f"law_forces_{law.NAME}", run_block=block), parallel=True)
 
 

@@ -26,6 +26,8 @@ _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01
 _LN2_LOW = 1.90821492927058770002e-10
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
+#: 4/3 of the exponent's bias, less what balances the guess's error, in units of 2^-20.
+_CUBE_ROOT_START = 1430186360.0
 
 
 @device
@@ -102,6 +104,22 @@ def log(x):
     # log(1 + d) = d - d^2/2 + f (d^2/2 + 2 s series)
     h = 0.5 * d * d
     return count * _LN2_HIGH + (d - (h - (f * (h + 2.0 * s * series) + count * _LN2_LOW)))
+
+
+@device
+def inverse_cube_root(x):
+    """``x^(-1/3)`` of a positive normal number.
+
+    The exponent and the first digits, read as one number, are near to the logarithm: divided by -3 they give a first
+    guess that is right to 4 %. Two steps of the series of ``(1 - e)^(-1/3)``, ``e = 1 - x y^3``, do the rest.
+    """
+    top = np.int64((np.float64(x).view(np.int64) >> 32) + _ROUND_BITS).view(np.float64) - _ROUND
+    shifted = (_CUBE_ROOT_START - top * (1.0 / 3.0)) + _ROUND
+    y = np.int64((np.float64(shifted).view(np.int64) - _ROUND_BITS) << 32).view(np.float64)
+    e = 1.0 - x * (y * y * y)
+    y = y + y * (e * ((1.0 / 3.0 + e * (2.0 / 9.0)) + e * e * (14.0 / 81.0 + e * (35.0 / 243.0))))
+    e = 1.0 - x * (y * y * y)
+    return y + y * (e * (1.0 / 3.0 + e * (2.0 / 9.0)))
 
 
 @device

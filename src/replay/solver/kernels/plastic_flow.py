@@ -122,6 +122,13 @@ def exponential(b, det):
 
 
 @device
+def exponentials(b, det):
+    """Coefficients of ``exp(-b N)`` and ``exp(b N)``."""
+    shrunk = exponential(-b, det)
+    return shrunk, inverted(shrunk, det)
+
+
+@device
 def network_modulus(square, p):
     """mu_B of the mean squared plastic stretch."""
     y2 = min(square * p.per_locking_square, LOCKED)
@@ -131,23 +138,31 @@ def network_modulus(square, p):
 @device
 def internal_strains(flow, p, dgamma, stretching):
     """xi1, xi*, xi2 after `dgamma` by backward Euler, ``stretching = lambda_p - 1`` at the end."""
-    star = (flow.xi_star + p.star_rate * dgamma) / (1.0 + p.star_rate * dgamma * p.per_star_saturation)
-    first = (flow.xi1 + p.first_rate * dgamma) / (1.0 + p.first_rate * dgamma / star)
+    star = flow.xi_star + p.star_rate * dgamma
+    star_part = 1.0 + p.star_rate * p.per_star_saturation * dgamma
+    first_part = star + p.first_rate * dgamma * star_part
     second_rate = p.second_rate * stretching * dgamma
-    return first, star, (flow.xi2 + second_rate) / (1.0 + second_rate * p.per_second_saturation)
+    second_part = 1.0 + second_rate * p.per_second_saturation
+    # one division for all
+    both = first_part * second_part
+    whole = 1.0 / (both * star_part)
+    return (
+        (flow.xi1 + p.first_rate * dgamma) * star * (whole * second_part * star_part),
+        star * (whole * both),
+        (flow.xi2 + second_rate) * (whole * first_part * star_part),
+    )
 
 
 @device
-def flow_residual(flow, p, dgamma):
+def flow_residual(flow, p, dgamma, shrunk, grown):
     """``tau - kappa - alpha_p <p>`` [Pa] after `dgamma`, and its derivative by dgamma.
 
+    `shrunk` and `grown` are the coefficients of ``exp(-2bN)`` and ``exp(2bN)``.
     ``M = mu exp(-bN) Ce exp(-bN)`` and ``Bp = exp(bN) Bp exp(bN)`` commute with N under the trace, so both enter by
     their moments. M:N falls and Bp:N rises with b, whatever the axes of Ce and Bp.
     """
     det = flow.det
     b = dgamma * _PER_ROOT_2
-    shrunk = squared(exponential(-b, det), det)
-    grown = inverted(shrunk, det)
     fall, rise = times_n(shrunk, det), times_n(grown, det)
     pulled = product(rise, flow.plastic)
     square = product(grown, flow.plastic) * (1.0 / 3.0)
@@ -204,7 +219,8 @@ def _newton(flow, p, u, most):
     cosine = math.sqrt(size * size + 1.0)
     s = select(size < 1e-3, size * (1.0 - size * size * (1.0 / 6.0)), log(size + cosine))
     dgamma = flow.reach * exp(p.exponent * u)
-    rest, slope = flow_residual(flow, p, dgamma)
+    shrunk = squared(exponential(-dgamma * _PER_ROOT_2, flow.det), flow.det)
+    rest, slope = flow_residual(flow, p, dgamma, shrunk, inverted(shrunk, flow.det))
     residual = rest - p.yield_ * s
     viscous = p.yield_ * size / cosine
     downward = max(viscous - p.exponent * dgamma * slope, 0.5 * viscous)
@@ -224,8 +240,9 @@ def solve_flow(flow, p, trial):
 
     Returns
     -------
-    dgamma, residual
-        The second before the last Newton step, over the larger of Y and `trial`: a bound of what is left.
+    dgamma, residual, holds
+        The second before the last Newton step, over the larger of Y and `trial`: a bound of what is left. The third
+        is true: steps of any size are solved.
 
     Notes
     -----
@@ -248,4 +265,4 @@ def solve_flow(flow, p, trial):
     u, _ = _newton(flow, p, u, most)
     u, residual = _newton(flow, p, u, most)
     dgamma = flow.reach * exp(p.exponent * u)
-    return select(flows, dgamma, 0.0), select(flows, residual / max(trial, p.yield_), 0.0)
+    return select(flows, dgamma, 0.0), select(flows, residual / max(trial, p.yield_), 0.0), True

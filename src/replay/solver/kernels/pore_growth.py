@@ -20,7 +20,7 @@ from replay.solver.kernels.mathx import exp, expm1, log1p, sinh
 from replay.solver.kernels.tensors import add_trace, contract, trace
 
 #: ``1 - w`` never falls below this, so that phi stays below one.
-_SOLID = 1e-9
+SOLID = 1e-9
 
 
 @device
@@ -49,6 +49,11 @@ def grow_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensitivi
         Increment ``sqrt(2/3) |Dp| dt``.
     exponent, shear_sensitivity, cap
         m_CA, K_pore, largest argument of the hyperbolic sine.
+
+    Returns
+    -------
+    w, phi, holds
+        The third is true: steps of any size are right.
     """
     mean = trace(stress) * (1.0 / 3.0)
     deviator = add_trace(stress, -mean)
@@ -60,8 +65,8 @@ def grow_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensitivi
     sheared = shear_sensitivity * lode_function(deviator, per_mises) * work
     # dw/dphi = (m + 1) (1 - phi)^m
     opened = power * (1.0 - w) * sheared / (1.0 - phi)
-    w = min(w * pulled + opened, 1.0 - _SOLID)
-    return w, max(-expm1(log1p(-w) / power), phi)
+    w = min(w * pulled + opened, 1.0 - SOLID)
+    return w, max(-expm1(log1p(-w) / power), phi), True
 
 
 def _advance_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensitivity, cap):
@@ -69,7 +74,7 @@ def _advance_pores(w, phi, stress, strain, plastic_strain, exponent, shear_sensi
     for k in range(w.shape[0]):
         s = (stress[k, 0], stress[k, 1], stress[k, 2], stress[k, 3], stress[k, 4], stress[k, 5])
         e = (strain[k, 0], strain[k, 1], strain[k, 2], strain[k, 3], strain[k, 4], strain[k, 5])
-        w[k], phi[k] = grow_pores(w[k], phi[k], s, e, plastic_strain[k], exponent, shear_sensitivity, cap)
+        w[k], phi[k], _ = grow_pores(w[k], phi[k], s, e, plastic_strain[k], exponent, shear_sensitivity, cap)
 
 
 advance_pores = compiled(_advance_pores)

@@ -22,6 +22,9 @@ A law is a module with
     How many numbers ``constants()`` gives.
 ``update(motion, stress, state, dt, p)``
     Scalar, branch-free; returns stress, state and `Moduli`.
+``small_update``
+    Optional: a cheaper `update` for small steps. It leaves its last state variable negative where a step was too
+    large for it; the lane loop then takes `update` for that element.
 
 `replay.solver.materials` lists them; adding a law touches that list and nothing else.
 """

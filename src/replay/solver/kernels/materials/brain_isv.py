@@ -22,8 +22,8 @@ is left, whose unknown is ``u = ln(dgamma/(gdot0 dt))/m``:
 
     tau(dgamma) - kappa(dgamma) - alpha_p <p> = Y asinh(e^u)
 
-(`plastic_flow`). Five Newton steps solve it; the residual before the last of them, over the larger of Y and the trial
-stress, is kept at its greatest and shown as ``flow_residual``.
+(`plastic_flow`). Five Newton steps solve it for a step of any size, two for a small one (`small_step`). What they can
+have left, over the larger of Y and the trial stress, is kept at its greatest and shown as ``flow_residual``.
 """
 
 from __future__ import annotations
@@ -35,9 +35,20 @@ from typing import NamedTuple
 
 from replay.solver.kernels.device import device
 from replay.solver.kernels.element import Moduli
-from replay.solver.kernels.mathx import exp, log
-from replay.solver.kernels.plastic_flow import Flow, exponential, internal_strains, moments, network_modulus, solve_flow
+from replay.solver.kernels.lanes import specialise
+from replay.solver.kernels.mathx import inverse_cube_root, select
+from replay.solver.kernels.plastic_flow import (
+    Flow,
+    exponentials,
+    internal_strains,
+    moments,
+    network_modulus,
+    product,
+    solve_flow,
+    squared,
+)
 from replay.solver.kernels.pore_growth import grow_pores
+from replay.solver.kernels.small_step import grow_few_pores, short_exponentials, small_flow
 from replay.solver.kernels.tensors import (
     add_scaled_sym,
     add_trace,
@@ -251,16 +262,15 @@ def _cofactors(m):
     return cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])
 
 
-@device
-def update(motion, stress, state, dt, p):
-    """Stress and state after the step."""
+def _step(motion, stress, state, dt, p):
+    """Stress and state after the step; a negative ``flow_residual`` says that the step was not small enough."""
     p = Constants(*p)
     inverse = ((state[0], state[1], state[2]), (state[3], state[4], state[5]), (state[6], state[7], state[8]))
     beta = (state[9], state[10], state[11], state[12], state[13], state[14])
 
     # elastic trial: the step deforms, nothing flows
     f = motion.deformation
-    shrink = exp(log(dot(f[0], cross(f[1], f[2]))) * (-1.0 / 3.0))
+    shrink = inverse_cube_root(dot(f[0], cross(f[1], f[2])))
     trial = _matrix_product((scale(shrink, f[0]), scale(shrink, f[1]), scale(shrink, f[2])), inverse)
     elastic = right_cauchy_green(trial)
     # Bp = Fp Fp^T with Fp the cofactors transposed
@@ -272,39 +282,49 @@ def update(motion, stress, state, dt, p):
     n = scale_sym(1.0 / max(size, 1e-300), driving)
     n2 = commuting_product(n, n)
     ratio = motion.volume_ratio
-    mean = 0.5 * p.bulk * (ratio - 1.0 / ratio)
+    per_ratio = 1.0 / ratio
+    mean = 0.5 * p.bulk * (ratio - per_ratio)
 
     det = contract(n, n2) * (1.0 / 3.0)
     flow = Flow(
         det, moments(n, n2, elastic), moments(n, n2, plastic), contract(n, beta), state[15], state[16], state[17],
         p.pressure_sensitivity * max(-mean, 0.0), p.reference_rate * dt,
     )  # fmt: skip
-    dgamma, residual = solve_flow(flow, p, size)
+    dgamma, residual, flow_holds = solve_flow(flow, p, size)
 
     # Fp <- exp(b N) Fp; what rounding did to its determinant is taken out
     b = dgamma * _PER_ROOT_2
-    c = exponential(-b, det)
+    c, grown = exponentials(b, det)
     flown = add_trace(add_scaled_sym(scale_sym(c[1], n), c[2], n2), c[0])
     inverse = _times(inverse, flown)
     keep = 1.0 - (dot(inverse[0], cross(inverse[1], inverse[2])) - 1.0) * (1.0 / 3.0)
     x, y, z = scale(keep, inverse[0]), scale(keep, inverse[1]), scale(keep, inverse[2])
     stretched = left_cauchy_green(_times(trial, flown))
-    new = add_trace(scale_sym(p.shear / ratio, deviator(stretched)), mean)
+    new = add_trace(scale_sym(p.shear * per_ratio, deviator(stretched)), mean)
 
-    square = trace(right_cauchy_green(_cofactors((x, y, z)))) * (1.0 / 3.0)
+    square = product(squared(grown, det), flow.plastic) * (1.0 / 3.0)
     stretch = math.sqrt(square)
     beta = add_scaled_sym(beta, p.back_rate * (square + 1.0 / stretch) * b, n)
     xi1, xi_star, xi2 = internal_strains(flow, p, dgamma, max(stretch - 1.0, 0.0))
     plastic_strain = dgamma * _PER_ROOT_3
-    w, phi = grow_pores(
+    w, phi, growth_holds = grow_pores(
         state[20], state[19], new, motion.strain, plastic_strain, p.pore_exponent, p.pore_shear, p.pore_cap
     )
 
     # bound of the isochoric tangent in space, as of a neo-Hookean solid; flow only softens it
-    stiff = p.shear * max(1.0, trace(stretched) * (1.0 / 3.0)) * max(1.0 / ratio, 1.0)
-    tangent = 0.5 * p.bulk * (ratio + 1.0 / ratio)
+    stiff = p.shear * max(1.0, trace(stretched) * (1.0 / 3.0)) * max(per_ratio, 1.0)
+    tangent = 0.5 * p.bulk * (ratio + per_ratio)
+    residual = select(flow_holds & growth_holds, max(state[21], residual), -1.0)
     return (
         new,
-        (*x, *y, *z, *beta, xi1, xi_star, xi2, state[18] + plastic_strain, phi, w, max(state[21], residual)),
+        (*x, *y, *z, *beta, xi1, xi_star, xi2, state[18] + plastic_strain, phi, w, residual),
         Moduli(tangent - (2.0 / 3.0) * p.shear, stiff, p.shear),
     )
+
+
+#: For steps of any size.
+update = device(_step)
+#: For those of a run.
+small_update = device(
+    specialise(_step, "small_update", solve_flow=small_flow, exponentials=short_exponentials, grow_pores=grow_few_pores)
+)
