@@ -1,15 +1,18 @@
-"""Head and helmet: the hexahedral model, its materials, its numbers and its picture."""
+"""Head, helmet and body: the hexahedral model, its materials, its numbers and its picture."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from replay.models.body.player import BodyPlan, with_body
+from replay.models.body.posture import Posture, posture_names
 from replay.models.build import build_model
 from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
-from replay.models.model import Model, Part, read_model, write_model
+from replay.models.model import Model, ModelJoint, Part, read_model, write_model
 from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
+from replay.models.players import placed, second_player, together
 from replay.models.submodel import select_assembly
 
 
@@ -22,9 +25,12 @@ def write_preview(path: str | Path, model: Model) -> None:
 
 __all__ = [
     "PARTS",
+    "BodyPlan",
     "HelmetDesign",
     "Model",
+    "ModelJoint",
     "Part",
+    "Posture",
     "assembly_inspection",
     "assembly_mass",
     "brain_material",
@@ -36,9 +42,14 @@ __all__ = [
     "load_materials",
     "mass_report",
     "parts_table",
+    "placed",
+    "posture_names",
     "read_model",
+    "second_player",
     "select_assembly",
     "summary_text",
+    "together",
+    "with_body",
     "write_model",
     "write_parts_table",
     "write_preview",

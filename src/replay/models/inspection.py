@@ -175,8 +175,7 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    blocks = {name: blocks_of(model).of(name) for name in ("head", "helmet")}
-    outside = [p.name for p in model.parts if not blocks[p.assembly][0] < p.pid <= blocks[p.assembly][1]]
+    outside = parts_outside_block(model)
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"
@@ -201,6 +200,12 @@ def assembly_inspection(
         "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
+
+
+def parts_outside_block(model: Model) -> list[str]:
+    """Names of the parts whose number lies outside the block of their player's assembly (protocol 1.6)."""
+    block = [PLAYERS[model.info.get("player", part.player)].of(part.assembly) for part in model.parts]
+    return [part.name for part, (low, high) in zip(model.parts, block) if not low < part.pid <= high]
 
 
 def unconnected_parts(model: Model) -> list[str]:

@@ -37,6 +37,8 @@ ROLES = (
     "facemask",
     "chin_cup",
     "strap",
+    "bone",
+    "flesh",
     "other",
 )
 
@@ -64,11 +66,9 @@ class Part:
     role
         One of `ROLES`.
     assembly
-        ``head`` or ``helmet``.
+        ``head``, ``helmet`` or ``body``.
     material
         Key of the model's `materials`.
-    player
-        ``struck`` or ``impactor``, of a model of two players.
     """
 
     pid: int
@@ -76,12 +76,47 @@ class Part:
     role: str
     assembly: str
     material: str
-    player: str = "struck"
+
+    @property
+    def player(self) -> int:
+        """1, or 2 for a part whose number lies in a block of the second player."""
+        return 2 if self.pid // 10_000_000 in (2, 4) else 1
+
+
+@dataclass(frozen=True)
+class ModelJoint:
+    """A joint between two rigid parts, as `replay.solver.Joint` takes it.
+
+    Parameters
+    ----------
+    name
+        Unique.
+    first, second
+        Part numbers.
+    centre_m
+        (3,) in the model's axes [m].
+    axes
+        x, y and z of the joint in rows, (3, 3).
+    stiffness_n_m_per_rad
+        About each axis for positive and negative angles, (3, 2).
+    damping_ratio, centre_stiffness_n_per_m, centre_damping_ratio
+        As the solver has them.
+    """
+
+    name: str
+    first: int
+    second: int
+    centre_m: tuple[float, ...]
+    axes: tuple[tuple[float, ...], ...]
+    stiffness_n_m_per_rad: tuple[tuple[float, ...], ...]
+    damping_ratio: float
+    centre_stiffness_n_per_m: float
+    centre_damping_ratio: float
 
 
 @dataclass(frozen=True)
 class Model:
-    """Head and helmet as hexahedra, in the head frame (x anterior, y left, z superior, origin at the head's CG).
+    """Head, helmet and body as hexahedra, in the head frame (x anterior, y left, z superior, origin at the head's CG).
 
     Parameters
     ----------
@@ -111,6 +146,10 @@ class Model:
         Name to ``{law, density_kg_per_m3, parameters, certainty, source}``.
     info
         Preset, resolution, calibration and notes.
+    joints
+        Joints between rigid parts.
+    rigid_node_sets
+        Names of the node sets that move as one body; one that shares a node with a rigid part moves with it.
     """
 
     nodes: np.ndarray
@@ -126,6 +165,8 @@ class Model:
     materials: dict[str, dict[str, Any]]
     info: dict[str, Any]
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)
+    joints: tuple[ModelJoint, ...] = ()
+    rigid_node_sets: tuple[str, ...] = ()
 
     def part_index(self, name: str) -> int:
         """Index of the part of this name.
@@ -141,7 +182,7 @@ class Model:
         raise KeyError(name)
 
     def elements_of(
-        self, *, role: str | None = None, assembly: str | None = None, player: str | None = None
+        self, *, role: str | None = None, assembly: str | None = None, player: int | None = None
     ) -> np.ndarray:
         """Mask (m,) bool of the elements whose part has this role and belongs to this assembly and player."""
         chosen = [
@@ -173,6 +214,8 @@ def write_model(path: str | Path, model: Model) -> None:
         "materials": model.materials,
         "info": model.info,
     }
+    if model.joints or model.rigid_node_sets:
+        document |= {"joints": [asdict(j) for j in model.joints], "rigid_node_sets": list(model.rigid_node_sets)}
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         file.attrs["schema"] = SCHEMA
         file.attrs["schema_version"] = SCHEMA_VERSION
@@ -231,7 +274,14 @@ def read_model(path: str | Path) -> Model:
         materials=document["materials"],
         info=document["info"],
         node_sets=node_sets,
+        joints=tuple(_joint(joint) for joint in document.get("joints", [])),
+        rigid_node_sets=tuple(document.get("rigid_node_sets", [])),
     )
+
+
+def _joint(facts: dict[str, Any]) -> ModelJoint:
+    rows = {name: tuple(map(tuple, facts[name])) for name in ("axes", "stiffness_n_m_per_rad")}
+    return ModelJoint(**{**facts, **rows, "centre_m": tuple(facts["centre_m"])})
 
 
 def _check_schema(path: Path, file: h5py.File) -> None:

@@ -33,8 +33,8 @@ class Blocks:
     helmet: int
 
     def of(self, assembly: str) -> tuple[int, int]:
-        """First and last number of the block of ``head`` or ``helmet``."""
-        first = self.head if assembly == "head" else self.helmet
+        """First and last number of the block of ``head``, ``helmet`` or ``body``, which shares the head's."""
+        first = self.helmet if assembly == "helmet" else self.head
         return first, first + BLOCK_SIZE - 1
 
     @property

@@ -1,106 +1,182 @@
-"""Two players in one model: the impactor's numbers and names, its place, and both together.
+"""Players in one assembly: numbers of their own, and places of their own.
 
-The struck player keeps the numbers of a single player: helmet 1 from 10,000,000, body 1 from 60,000,000. The
-impactor gets those of the article's second one: helmet 2 from 20,000,000, body 2 from 40,000,000.
+Player 1 has the article's blocks 10,000,000 (helmet) and 60,000,000 (head and body), player 2 has 20,000,000 and
+40,000,000. Names of player 2 end in ``_2``; sets that the article numbers by player take the 2 in place of the 1.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from replay.models.model import GRID_DECIMALS, Model
+from replay.models.model import Model
 
-PREFIX = "impactor_"
-"""Before every name of the impactor's that is not an article's own."""
-EVERYTHING = "all_parts"
-PLAYER_SETS = {"struck": ("head_1", "helmet_1"), "impactor": ("head_2", "helmet_2")}
-"""Sets that hold all parts of each player; a deck's set is a range of numbers, and no one range holds a player."""
-#: First number of each block of player 1, and what brings it to that of player 2.
-_SHIFTS = ((10_000_000, 20_000_000, 10_000_000), (60_000_000, 70_000_000, -20_000_000))
+#: Millions of player 1 to those of player 2.
+BLOCKS_OF_SECOND = {10: 20, 60: 40}
+_MILLION = 1_000_000
+_ALL = "all_parts"
 
 
-def as_impactor(model: Model) -> Model:
-    """Give a player the numbers and names of the second one.
+def second_player(model: Model) -> Model:
+    """Give a model the numbers and names of player 2.
 
-    Parts, node sets and sets of parts are called as before with `PREFIX`, or by the article's number two: the set
-    ``H1_pads_set1`` becomes ``H2_pads_set1``, ``helmet_1`` becomes ``helmet_2``.
+    Parameters
+    ----------
+    model
+        Of player 1, with or without body.
+
+    Raises
+    ------
+    ValueError
+        When a number lies in no block of player 1.
     """
-    parts = tuple(
-        replace(part, pid=int(_second(np.array([part.pid]))[0]), name=PREFIX + part.name, player="impactor")
-        for part in model.parts
-    )
-    number = {old.pid: new.pid for old, new in zip(model.parts, parts)}
-    sets = {_named(name): tuple(number[pid] for pid in pids) for name, pids in model.part_sets.items()}
+    joints = tuple(
+        replace(
+            joint, name=f"{joint.name}_2", first=second_number(joint.first), second=second_number(joint.second)
+        )
+        for joint in model.joints
+    )  # fmt: skip
     return replace(
         model,
         node_ids=_second(model.node_ids),
         element_ids=_second(model.element_ids),
-        parts=parts,
-        part_sets=sets,
-        part_set_ids={
-            _named(name): int(_second(np.array([n]))[0]) if n > 99 else n for name, n in model.part_set_ids.items()
+        parts=tuple(
+            replace(p, pid=second_number(p.pid), name=f"{p.name}_2", material=f"{p.material}_2") for p in model.parts
+        ),
+        part_sets={
+            second_set_name(name): tuple(second_number(pid) for pid in pids) for name, pids in model.part_sets.items()
         },
-        node_sets={PREFIX + name: rows for name, rows in model.node_sets.items()},
+        part_set_ids={
+            second_set_name(name): number if name == _ALL else second_number(number)
+            for name, number in model.part_set_ids.items()
+        },
+        materials={f"{name}_2": facts for name, facts in model.materials.items()},
+        node_sets={f"{name}_2": rows for name, rows in model.node_sets.items()},
+        joints=joints,
+        rigid_node_sets=tuple(f"{name}_2" for name in model.rigid_node_sets),
+        info={**model.info, "player": 2},
     )
+
+
+def second_number(number: int) -> int:
+    """The number of player 2 for one of player 1.
+
+    Raises
+    ------
+    ValueError
+        When it lies in no block of player 1.
+    """
+    return int(_second(np.array([number]))[0])
 
 
 def _second(numbers: np.ndarray) -> np.ndarray:
-    """Numbers of player 2 for those of player 1."""
-    out = numbers.copy()
-    for low, high, shift in _SHIFTS:
-        out[(numbers >= low) & (numbers < high)] += shift
-    return out
+    # a block is ten millions long
+    block = numbers // (10 * _MILLION) * 10
+    known = np.array(sorted(BLOCKS_OF_SECOND))
+    if not np.isin(block, known).all():
+        message = f"number {numbers[~np.isin(block, known)][0]} lies in no block of player 1"
+        raise ValueError(message)
+    shift = np.array([BLOCKS_OF_SECOND[k] - k for k in known.tolist()])[np.searchsorted(known, block)]
+    return numbers + shift * _MILLION
 
 
-def _named(name: str) -> str:
-    """Name of a set of parts of player 2."""
-    if name == EVERYTHING:
+def second_set_name(name: str) -> str:
+    """Name of player 2's set: ``H2_pads_set1`` for ``H1_pads_set1``, ``head_2`` for ``head_1``, else ``_2`` behind."""
+    if name == _ALL:
         return name
-    renamed = re.sub(r"^H1_", "H2_", re.sub(r"_1$", "_2", name))
-    return renamed if renamed != name else PREFIX + name
+    if name.startswith("H1_"):
+        return "H2_" + name[3:]
+    return (name[:-2] if name.endswith("_1") else name) + "_2"
 
 
-def placed(model: Model, rotation: Rotation, position_m: np.ndarray) -> Model:
-    """Turn a model about its origin, the head's centre of gravity, and move that to a place."""
-    return replace(model, nodes=np.round(rotation.apply(model.nodes) + position_m, GRID_DECIMALS) + 0.0)
+def placed(model: Model, position_m: np.ndarray, rotation: Rotation) -> Model:
+    """Put a player into space.
 
-
-def joined(struck: Model, impactor: Model) -> Model:
-    """Both players in one model; the impactor must have come through `as_impactor`.
-
-    Materials of one name and one content are one; where the impactor's differ they get the prefix. ``info`` is the
-    struck player's, with the impactor's under ``impactor``.
+    Parameters
+    ----------
+    model
+        In the head frame.
+    position_m
+        Where the head's centre of gravity goes, (3,) [m].
+    rotation
+        Head to space.
     """
-    materials, name_of = _materials(struck.materials, impactor.materials)
-    parts = struck.parts + tuple(replace(part, material=name_of[part.material]) for part in impactor.parts)
-    n = len(struck.nodes)
-    everything = tuple(sorted(part.pid for part in parts))
-    return replace(
-        struck,
-        nodes=np.vstack([struck.nodes, impactor.nodes]),
-        node_ids=np.concatenate([struck.node_ids, impactor.node_ids]),
-        hexes=np.vstack([struck.hexes, impactor.hexes + n]).astype(np.int32),
-        element_ids=np.concatenate([struck.element_ids, impactor.element_ids]),
-        element_part=np.concatenate([struck.element_part, impactor.element_part + len(struck.parts)]).astype(np.int32),
-        element_region=np.concatenate([struck.element_region, impactor.element_region]),
-        parts=parts,
-        part_sets=struck.part_sets | impactor.part_sets | {EVERYTHING: everything},
-        part_set_ids=struck.part_set_ids | impactor.part_set_ids,
-        materials=materials,
-        node_sets=struck.node_sets | {name: (rows + n).astype(np.int32) for name, rows in impactor.node_sets.items()},
-        info={**struck.info, "impactor": impactor.info},
+    position = np.asarray(position_m, float)
+    joints = tuple(
+        replace(
+            joint,
+            centre_m=tuple((position + rotation.apply(joint.centre_m)).tolist()),
+            axes=tuple(map(tuple, rotation.apply(np.array(joint.axes)).tolist())),
+        )
+        for joint in model.joints
     )
+    return replace(model, nodes=position + rotation.apply(model.nodes), joints=joints)
 
 
-def _materials(
-    struck: Mapping[str, dict[str, Any]], impactor: Mapping[str, dict[str, Any]]
-) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
-    """Materials of both, and the name of each of the impactor's among them."""
-    name_of = {name: name if struck.get(name, facts) == facts else PREFIX + name for name, facts in impactor.items()}
-    return {**struck, **{name_of[name]: facts for name, facts in impactor.items()}}, name_of
+def together(models: Sequence[Model]) -> Model:
+    """Several players as one model.
+
+    Parameters
+    ----------
+    models
+        Placed, with numbers that do not clash.
+
+    Returns
+    -------
+    Model
+        ``info["players"]`` keeps the notes of each; notes in which all agree stand beside it.
+
+    Raises
+    ------
+    ValueError
+        When a number or a name occurs twice, or their regions differ.
+    """
+    numbers: tuple[tuple[str, list[int] | list[str]], ...] = (
+        ("node number", [n for m in models for n in m.node_ids.tolist()]),
+        ("element number", [n for m in models for n in m.element_ids.tolist()]),
+        ("part number", [p.pid for m in models for p in m.parts]),
+        ("part", [p.name for m in models for p in m.parts]),
+        ("material", [name for m in models for name in m.materials]),
+        ("node set", [name for m in models for name in m.node_sets]),
+        ("joint", [j.name for m in models for j in m.joints]),
+    )
+    for what, found in numbers:
+        twice = [value for value, count in Counter(found).items() if count > 1]
+        if twice:
+            message = f"{what} {twice[0]} occurs twice; give a player the numbers of `second_player`"
+            raise ValueError(message)
+    if len({m.region_names for m in models}) > 1:
+        message = "the players' brains have different regions"
+        raise ValueError(message)
+    first_node = np.cumsum([0, *(len(m.nodes) for m in models)])
+    first_part = np.cumsum([0, *(len(m.parts) for m in models)])
+    sets: dict[str, tuple[int, ...]] = {}
+    for model in models:
+        for name, pids in model.part_sets.items():
+            sets[name] = tuple(sorted({*sets.get(name, ()), *pids}))
+    shared = {k: v for k, v in models[0].info.items() if all(m.info.get(k) == v for m in models)}
+    return Model(
+        nodes=np.vstack([m.nodes for m in models]),
+        node_ids=np.concatenate([m.node_ids for m in models]),
+        hexes=np.vstack([m.hexes + k for m, k in zip(models, first_node)]).astype(np.int32),
+        element_ids=np.concatenate([m.element_ids for m in models]),
+        element_part=np.concatenate([m.element_part + k for m, k in zip(models, first_part)]).astype(np.int32),
+        element_region=np.concatenate([m.element_region for m in models]),
+        parts=tuple(p for m in models for p in m.parts),
+        region_names=models[0].region_names,
+        part_sets=sets,
+        part_set_ids={name: number for m in models for name, number in m.part_set_ids.items()},
+        materials={name: facts for m in models for name, facts in m.materials.items()},
+        info={**shared, "players": [m.info for m in models]},
+        node_sets={
+            name: (rows + k).astype(np.int32)
+            for m, k in zip(models, first_node)
+            for name, rows in m.node_sets.items()
+        },
+        joints=tuple(j for m in models for j in m.joints),
+        rigid_node_sets=tuple(name for m in models for name in m.rigid_node_sets),
+    )  # fmt: skip

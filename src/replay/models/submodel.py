@@ -17,7 +17,7 @@ def select_assembly(model: Model, assembly: str) -> Model:
     model
         The model.
     assembly
-        ``head`` or ``helmet``.
+        ``head``, ``helmet`` or ``body``.
 
     Raises
     ------
@@ -38,6 +38,7 @@ def select_assembly(model: Model, assembly: str) -> Model:
     sets = {name: tuple(p for p in members if p in pids) for name, members in model.part_sets.items()}
     sets = {name: members for name, members in sets.items() if members}
     node_sets = {name: row[rows][row[rows] >= 0].astype(np.int32) for name, rows in model.node_sets.items()}
+    node_sets = {name: rows for name, rows in node_sets.items() if len(rows)}
     return replace(
         model,
         nodes=model.nodes[used],
@@ -49,6 +50,8 @@ def select_assembly(model: Model, assembly: str) -> Model:
         parts=tuple(model.parts[k] for k in old),
         part_sets=sets,
         part_set_ids={name: model.part_set_ids[name] for name in sets},
-        node_sets={name: rows for name, rows in node_sets.items() if len(rows)},
+        node_sets=node_sets,
+        joints=tuple(joint for joint in model.joints if {joint.first, joint.second} <= pids),
+        rigid_node_sets=tuple(name for name in model.rigid_node_sets if name in node_sets),
         materials={model.parts[k].material: model.materials[model.parts[k].material] for k in old},
     )

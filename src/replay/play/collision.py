@@ -11,6 +11,8 @@ from replay.documents import Number, Setting, refuse
 from replay.play.controls import FrictionPair
 from replay.play.fields import Positive, Quaternion, Vector3
 
+Shipped = Annotated[str, Field(pattern=r"^[a-z_]+$")]
+"""Name of a piece of a helmet that ships with the models."""
 _LEAST_AXIS_M = 1e-9
 
 
@@ -53,10 +55,44 @@ class ReconstructedStart(Setting):
 Start = Annotated[GivenStart | ReconstructedStart, Field(discriminator="kind")]
 
 
+class Body(Setting):
+    """The body below a player's head."""
+
+    stature_m: Annotated[Number, Field(ge=1.6, le=2.1)] = Field(default=1.85, description="Stature [m].")
+    mass_kg: Annotated[Number, Field(ge=60, le=180)] = Field(
+        default=110.0, description="Mass without helmet, the head included [kg]."
+    )
+    muscle: Annotated[Number, Field(ge=0.5, le=1.0)] = Field(default=0.9, description="0.5 average, 1 most.")
+    posture: Literal["standing", "striker", "struck"] = Field(
+        default="standing", description="Posture of trunk and limbs; the head turns as its start says."
+    )
+    tissue: Literal["rigid", "deformable"] = Field(
+        default="rigid",
+        description="`rigid`: segments move as one but for flesh at the joints; `deformable`: flesh about bones.",
+    )
+
+
+class Worn(Setting):
+    """What of the helmet is not as `model` says."""
+
+    helmet: Shipped | None = Field(default=None, description="Helmet: `classic` or `modern`.")
+    facemask: Shipped | None = Field(default=None, description="Facemask: `classic`, `modern`, `open`, or `none`.")
+    pads: Shipped | None = Field(default=None, description="Pads: `classic` or `modern`.")
+    chinstrap: Shipped | None = Field(default=None, description="Chin strap: `low`, `high` or `two_point`.")
+
+
 class Player(Setting):
     """One of the two players."""
 
     name: str = Field(default="not recorded", description="Who it is.", min_length=1)
+    wears: Worn = Field(
+        default_factory=lambda: Worn(),
+        description="What this player wears that `model` does not say of both.",
+        examples=[{"facemask": "none"}],
+    )
+    body: Body | None = Field(
+        default=None, description="The body; without it head and helmet are free, and the report says what that lacks."
+    )
     start: Start = Field(
         default_factory=lambda: GivenStart(),
         description="Posture and velocities: `given`, or by `reconstruction`; at rest, facing along x, where absent.",

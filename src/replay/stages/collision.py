@@ -7,11 +7,17 @@ from typing import Any
 import numpy as np
 
 from replay.models import Model
-from replay.models.players import PREFIX
 from replay.play import Play
 from replay.solver import ContactControls, ContactPair, Controls, Problem
 from replay.stages.players import ROLES, PlayerStart, scene_velocities
-from replay.stages.problem import chin_straps, contact_controls, part_numbers, seated_by_contact, solver_parts
+from replay.stages.problem import (
+    body_links,
+    chin_straps,
+    contact_controls,
+    part_numbers,
+    seated_by_contact,
+    solver_parts,
+)
 
 
 def collision_problem(scene: Model, placement: dict[str, Any], controls: Controls, play: Play) -> Problem:
@@ -40,7 +46,8 @@ def scene_at_rest(scene: Model, controls: Controls, play: Play) -> Problem:
 
 
 def _problem(scene: Model, velocities: np.ndarray, controls: Controls, play: Play) -> Problem:
-    shells, straps = zip(*(chin_straps(scene, prefix) for prefix in ("", PREFIX)))
+    bodies, joints = body_links(scene)
+    shells, straps = zip(*(chin_straps(scene, number) for number in ROLES.values()))
     return Problem(
         nodes=scene.nodes,
         hexes=scene.hexes,
@@ -50,7 +57,8 @@ def _problem(scene: Model, velocities: np.ndarray, controls: Controls, play: Pla
         initial_velocity=velocities,
         node_ids=scene.node_ids,
         element_ids=scene.element_ids,
-        rigid_sets=sum(shells, ()),
+        rigid_sets=(*sum(shells, ()), *bodies),
+        joints=joints,
         straps=sum(straps, ()),
         contact=contact_of_players(scene, play),
     )
@@ -64,8 +72,8 @@ def contact_of_players(scene: Model, play: Play) -> ContactControls:
     assert play.collision is not None
     apart: list[ContactPair] = []
     if not seated_by_contact(scene):
-        for role in ROLES:
-            own = tuple(part.pid for part in scene.parts if part.player == role)
+        for role, number in ROLES.items():
+            own = tuple(part.pid for part in scene.parts if part.player == number)
             apart.append(ContactPair(own, own, active=False, name=f"within the {role} player"))
     between = [
         ContactPair(

@@ -186,8 +186,8 @@ def build_task(model: SolverModel, controls: SolveControls, file: Path) -> Solve
         initial_velocity=velocity,
         prescribed=tuple(read_motion(file.parent / m.file, m.parts, m.rigid_sets) for m in controls.prescribed_motions),
         node_ids=model.node_ids, element_ids=model.element_ids, fixed=fixed, nodal_forces=loads,
-        rigid_sets=tuple(rigid_sets), joints=tuple(_joint(j) for j in controls.joints), straps=tuple(straps),
-        ties=tuple(ties),
+        rigid_sets=(*model.rigid_sets, *rigid_sets), joints=(*model.joints, *map(_joint, controls.joints)),
+        straps=tuple(straps), ties=tuple(ties),
     )  # fmt: skip
     recorders: list[Recorder] = []
     if len(written[0]):

@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 from replay import decks
 from replay.files import read_json
 from replay.models import Model, read_model
-from replay.models.players import PLAYER_SETS
 from replay.motion import Kinematics
 from replay.play import Play
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import replayed_model
 from replay.stages.own_deck import model_facts, node_sets, region_sets
+from replay.stages.players import PLAYER_SETS
 from replay.stages.problem import chin_straps, seated_by_contact
 from replay.stages.settings import read_settings
 
@@ -80,7 +80,7 @@ def collision_deck(play: Play, scene: Model, placement: dict[str, Any]) -> decks
         start = placement["players"][role]
         p, q = (_triple(np.array(start[key])) for key in ("P_global_m", "Q_global_m"))
         velocity = _triple(np.array(start["velocity_m_per_s"]))
-        for name in names:
+        for name in (name for name in names if name in scene.part_sets):
             number = scene.part_set_ids[name]
             velocities.append(decks.InitialVelocity(number, velocity, start["omega_rad_per_s"], p, q))
     return decks.DeckInput(

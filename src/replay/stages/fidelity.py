@@ -10,6 +10,7 @@ from replay.measures import Motion, fidelity
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import replayed_model
+from replay.stages.players import ROLES
 from replay.stages.settings import read_settings
 from replay.stages.verdict import limits_of
 
@@ -20,7 +21,7 @@ def run(workspace: Workspace) -> str | None:
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
-    tracked = "struck" if play.collision is None else play.collision.tracked
+    tracked = 1 if play.collision is None else ROLES[play.collision.tracked]
     target = DRIVER.read(stage.read("driver", "driver_6dof.csv"))
     result = fidelity(Motion.from_columns({n: target[n] for n in target}), skull_motion(stage, tracked))
     write_json(stage.write("fidelity.json", "target against applied motion, article Table 4"), result)
@@ -36,7 +37,7 @@ def run(workspace: Workspace) -> str | None:
 _QUANTITIES = ("linear_acceleration", "angular_acceleration", "angular_velocity")
 
 
-def skull_motion(stage: Stage, player: str = "struck") -> Motion:
+def skull_motion(stage: Stage, player: int = 1) -> Motion:
     """Motion of a player's skull, from the solver's histories."""
     parts = replayed_model(stage).parts
     skull = next(part.pid for part in parts if part.role == "skull" and part.player == player)

@@ -135,7 +135,7 @@ def damage_recorder(model: Model) -> DamageRecorder:
 
 def _brain(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[str, NDArray[np.int64]]]:
     """Rows of the struck brain's elements, their numbers, and their positions by region."""
-    rows = np.flatnonzero(model.elements_of(role="brain", player="struck"))
+    rows = np.flatnonzero(model.elements_of(role="brain", player=1))
     region = model.element_region[rows]
     groups = {name: np.flatnonzero(region == k) for k, name in enumerate(model.region_names) if k > 0}
     return rows, model.element_ids[rows], groups

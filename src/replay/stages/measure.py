@@ -40,10 +40,10 @@ def run(workspace: Workspace) -> str | None:
 
     time = energy["time_s"].unique()
     bodies = {
-        assembly: [p.pid for p in model.parts if p.assembly == assembly and p.player == "struck"]
+        assembly: [p.pid for p in model.parts if p.assembly == assembly and p.player == 1]
         for assembly in ("head", "helmet")
     }
-    bodies["impactor"] = [p.pid for p in model.parts if p.player == "impactor"]
+    bodies["impactor"] = [p.pid for p in model.parts if p.player == 2]
     action = {name: mechanical_action(time, kinetic_energy_of(energy, pids)) for name, pids in bodies.items() if pids}
     head, impactor = action["head"], action.get("impactor")
     write_action(

@@ -10,9 +10,10 @@ import numpy as np
 from replay.errors import InputError
 from replay.files import read_json, write_json
 from replay.gates import placement_gate
-from replay.models import Model, assembly_mass, parts_outside_block, read_model, write_model, write_preview
+from replay.models import Model, assembly_mass, placed, read_model, together, write_model, write_preview
 from replay.models.first_contact import FirstContact, first_contact, skin_of
-from replay.models.players import as_impactor, joined, placed
+from replay.models.inspection import parts_outside_block
+from replay.models.model import GRID_DECIMALS
 from replay.play import Collision
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.collision import scene_at_rest
@@ -23,6 +24,8 @@ from replay.stages.settings import read_settings
 from replay.stages.verdict import limits_of
 
 SCENE = "scene.h5"
+MODELS = {"struck": "model.h5", "impactor": "impactor.h5"}
+"""Files of the assembly stage."""
 _PLAY = "play.yaml"
 _LEAST_CLOSING_M_PER_S = 1e-3
 
@@ -35,10 +38,10 @@ def run(workspace: Workspace) -> str | None:
     play = read_settings(stage)
     if play.collision is None:
         raise InputError(_PLAY, "one driven head needs no placement", expected="a block `collision`")
-    model = read_model(stage.read("assembly", "model.h5"))
+    models = {role: read_model(stage.read("assembly", file)) for role, file in MODELS.items()}
     told = read_json(stage.read("driver", "starts.json"))
     starts = {role: PlayerStart.from_json(told[role]) for role in ROLES}
-    scene, found, places = place(model, starts, play.collision)
+    scene, found, places = place(models, starts, play.collision)
     problem = scene_at_rest(scene, controls_of(play, 1.0, checkpoint_every_s=0.0), play)
     inside = seat(problem)
     PENETRATION_TABLE.write(
@@ -77,7 +80,7 @@ def run(workspace: Workspace) -> str | None:
 
 
 def place(
-    model: Model, starts: dict[str, PlayerStart], collision: Collision
+    models: dict[str, Model], starts: dict[str, PlayerStart], collision: Collision
 ) -> tuple[Model, FirstContact, dict[str, np.ndarray]]:
     """Stand the struck player's head CG at the origin and bring the impactor to first contact.
 
@@ -94,17 +97,30 @@ def place(
             expected="an impactor that moves towards the struck player", mend="give the impactor its velocity",
         )  # fmt: skip
     direction = closing / speed
-    struck = placed(model, starts["struck"].rotation, np.zeros(3))
-    turned = placed(as_impactor(model), starts["impactor"].rotation, np.zeros(3))
+    struck = _stand(models["struck"], np.zeros(3), starts["struck"])
     aim = starts["struck"].rotation.apply(collision.aim_m)
-    back = np.abs(struck.nodes).max() * 2 + np.abs(turned.nodes).max() * 2 + np.abs(aim).max()
-    begin = dataclasses.replace(turned, nodes=turned.nodes + aim - back * direction)
-    found = first_contact(
-        skin_of(struck.nodes, struck.hexes), skin_of(begin.nodes, begin.hexes), direction, collision.gap_m
-    )
+    turned = _stand(models["impactor"], aim, starts["impactor"])
+    back = _reach(struck.nodes, -direction) - _reach(turned.nodes, -direction)
+    back = max(0.0, back + _reach(turned.nodes, direction) + _reach(turned.nodes, -direction)) + collision.gap_m
+    begin = skin_of(turned.nodes - back * direction, turned.hexes)
+    found = first_contact(skin_of(struck.nodes, struck.hexes), begin, direction, collision.gap_m)
     centre = aim + (found.travel_m - back) * direction
-    impactor = placed(as_impactor(model), starts["impactor"].rotation, centre)
-    return joined(struck, impactor), found, {"struck": np.zeros(3), "impactor": centre}
+    impactor = _stand(models["impactor"], centre, starts["impactor"])
+    scene = together([struck, impactor])
+    info = {name: fact for name, fact in struck.info.items() if name != "player"}
+    scene = dataclasses.replace(scene, info={**info, **scene.info})
+    return scene, found, {"struck": np.zeros(3), "impactor": centre}
+
+
+def _stand(model: Model, centre: np.ndarray, start: PlayerStart) -> Model:
+    """The player with the head CG at a place, turned as it starts, on the grid of a nanometre."""
+    stood = placed(model, centre, start.rotation)
+    return dataclasses.replace(stood, nodes=np.round(stood.nodes, GRID_DECIMALS) + 0.0)
+
+
+def _reach(nodes: np.ndarray, direction: np.ndarray) -> float:
+    """How far a mesh reaches along a direction [m]."""
+    return float(np.einsum("nk,k->n", nodes, direction).max())
 
 
 def _report(
@@ -115,10 +131,9 @@ def _report(
     collision: Collision,
 ) -> dict[str, Any]:
     closing = starts["impactor"].head_velocity() - starts["struck"].head_velocity()
-    parts = {role: [part for part in scene.parts if part.player == role] for role in ROLES}
-    index = {
-        role: [part.name for part in scene.parts][scene.element_part[scene.elements_of(player=role)][row]]
-        for role, row in zip(ROLES, found.elements)
+    touching = {
+        role: scene.parts[scene.element_part[scene.elements_of(player=number)][row]].name
+        for (role, number), row in zip(ROLES.items(), found.elements)
     }
     return {
         "closing_velocity_m_per_s": closing.tolist(),
@@ -126,8 +141,8 @@ def _report(
         "gap_m": found.gap_m,
         "first_contact": {
             "point_m": found.point_m.tolist(),
-            "struck_part": index["struck"],
-            "impactor_part": index["impactor"],
+            "struck_part": touching["struck"],
+            "impactor_part": touching["impactor"],
         },
         "players": {
             role: {
@@ -136,9 +151,8 @@ def _report(
                 **starts[role].to_json(),
                 "P_global_m": (places[role] + starts[role].rotation.apply(starts[role].p_m)).tolist(),
                 "Q_global_m": (places[role] + starts[role].rotation.apply(starts[role].q_m)).tolist(),
-                "mass_kg": assembly_mass(scene, player=role).mass_kg,
-                "parts": len(parts[role]),
+                "mass_kg": assembly_mass(scene, player=number).mass_kg,
             }
-            for role in ROLES
+            for role, number in ROLES.items()
         },
     }

@@ -14,7 +14,10 @@ from replay.motion import Kinematics, fit_start
 from replay.play import Collision, GivenStart
 from replay.solver import initial_velocity_about_axis
 
-ROLES = ("struck", "impactor")
+ROLES = {"struck": 1, "impactor": 2}
+"""The two players of a collision, and the number of each."""
+PLAYER_SETS = {"struck": ("head_1", "helmet_1", "body_1"), "impactor": ("head_2", "helmet_2", "body_2")}
+"""Sets that together hold all parts of a player: a deck's set is a range of numbers, and no range holds a player."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,7 @@ def scene_velocities(
 ) -> np.ndarray:
     """Initial velocities (n, 3) of both players' nodes [m/s]."""
     velocities = np.zeros_like(scene.nodes)
-    for role in ROLES:
-        rows = np.unique(scene.hexes[scene.elements_of(player=role)])
+    for role, number in ROLES.items():
+        rows = np.unique(scene.hexes[scene.elements_of(player=number)])
         velocities[rows] = starts[role].velocities(scene.nodes[rows], head_cg_m[role])
     return velocities

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from replay.models import Model, select_assembly
@@ -11,6 +13,7 @@ from replay.solver import (
     ContactControls,
     ContactPair,
     Controls,
+    Joint,
     Material,
     PrescribedMotion,
     Problem,
@@ -94,20 +97,36 @@ def contact_controls(model: Model, contact: Contact, more: tuple[ContactPair, ..
     )
 
 
-def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
-    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
+def chin_straps(model: Model, player: int = 1) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
+    """The hard shell of a player's chin cup, and the straps from its corners to the shell, as far as there are any."""
     if not seated_by_contact(model):
         return (), ()
-    sets, data = model.node_sets, model.info["strap"]
+    ending = "" if player == 1 else f"_{player}"
+    sets = {name: rows for name, rows in model.node_sets.items() if ending or not name.endswith("_2")}
+    sets = {name.removesuffix(ending): rows for name, rows in sets.items() if name.endswith(ending)}
+    data = model.info["players"][player - 1]["strap"] if "players" in model.info else model.info["strap"]
     straps = []
     for name in sorted(sets):
         place = name.removeprefix("strap_anchor_")
         cup = sets.get(f"chin_cup_strap_{place.rpartition('_')[2]}")
         if place != name and cup is not None:
             rows = np.array([sets[name][0], cup[0]], np.int64)
-            straps.append(Strap(f"chin_{place}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
-    shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
+            straps.append(Strap(f"chin_{place}{ending}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
+    shell = (RigidSet(f"chin_cup_shell{ending}", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
     return shell, tuple(straps)
+
+
+def body_links(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Joint, ...]]:
+    """Node sets that move as bodies, and joints, of a model with a body; none of a bare head."""
+    sets = tuple(RigidSet(name, model.node_sets[name].astype(np.int64)) for name in model.rigid_node_sets)
+    joints = tuple(
+        Joint(
+            j.name, j.first, j.second, np.array(j.centre_m), np.array(j.stiffness_n_m_per_rad), j.damping_ratio,
+            j.centre_stiffness_n_per_m, j.centre_damping_ratio, np.array(j.axes),
+        )
+        for j in model.joints
+    )  # fmt: skip
+    return sets, joints
 
 
 def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact: Contact) -> Problem:
@@ -128,8 +147,12 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         The play's ``solver.contact`` block.
     """
     shell, straps = chin_straps(model)
+    parts, (bodies, joints) = solver_parts(model), body_links(model)
     arms = driver.rotation[0].apply(model.nodes)
-    parts = solver_parts(model)
+    turn = driver.rotation[0].as_matrix()
+    joints = tuple(
+        dataclasses.replace(j, centre=driver.position_m[0] + turn @ j.centre, axes=j.axes @ turn.T) for j in joints
+    )
     return Problem(
         nodes=driver.position_m[0] + arms,
         hexes=model.hexes,
@@ -149,7 +172,8 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         ),
         node_ids=model.node_ids,
         element_ids=model.element_ids,
-        rigid_sets=shell,
+        rigid_sets=(*shell, *bodies),
+        joints=joints,
         straps=straps,
         contact=contact_of(model, contact),
     )
@@ -201,7 +225,7 @@ def helmet_problem(model: Model, speed_m_per_s: float, controls: Controls, conta
 
 
 def solver_parts(model: Model) -> tuple[SolverPart, ...]:
-    """Parts of a head and helmet model with their materials."""
+    """Parts of a model with their materials."""
     parts = []
     for part in model.parts:
         facts = model.materials[part.material]

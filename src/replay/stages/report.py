@@ -18,6 +18,7 @@ from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace, stages_of
 from replay.stages.impact import replayed_model
+from replay.stages.players import ROLES
 from replay.stages.settings import read_settings
 from replay.stages.verdict import ALL_GATE_FILES, GATE_FILES, limits_of
 
@@ -38,9 +39,13 @@ _DRIVEN = (
     "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
     " and facemask forces, contact work and the action of an impactor are not computed."
 )
-_COLLIDED = (
+_NO_BODY = (
     "The rest of the players. Two helmeted heads collide without necks and bodies, so that what follows the first"
     " milliseconds lacks the mass and the restraint that a neck would bring."
+)
+_BODY = (
+    "Muscles. Necks and bodies are passive: joints with springs of an assumed stiffness, and no muscle that is braced"
+    " or becomes active in thirty milliseconds."
 )
 _SEAT = {
     "shared_nodes": (
@@ -105,7 +110,7 @@ def collect(stage: Stage) -> ReportInput:
         "mesh": _mesh(model),
         "cannot_show": [
             _SEAT[play.model.helmet_seat],
-            _COLLIDED if play.collision else _DRIVEN,
+            *_blow(play),
             _BRAIN[play.model.brain_material],
             _STRUCTURE[play.model.helmet_structure],
             *quality["warnings"],
@@ -126,7 +131,7 @@ def collect(stage: Stage) -> ReportInput:
 def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     """What only a replay that ran to its end has."""
     measures = read_json(stage.read("measures", "measures.json"))
-    tracked = "struck" if play.collision is None else play.collision.tracked
+    tracked = 1 if play.collision is None else ROLES[play.collision.tracked]
     applied = skull_motion(stage, tracked)
     fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
@@ -175,6 +180,14 @@ def _contact(stage: Stage) -> list[dict[str, Any]]:
 
 def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:
     return pd.read_csv(stage.read(name, file))
+
+
+def _blow(play: Play) -> list[str]:
+    """What the way in which the head is struck cannot show."""
+    if play.collision is None:
+        return [_DRIVEN]
+    bodies = [play.collision.player(role).body for role in ROLES]
+    return [_BODY] * any(bodies) + [_NO_BODY] * (not all(bodies))
 
 
 def _play_facts(play: Play, quality: dict[str, Any], worn: Mapping[str, str]) -> dict[str, Any]:

