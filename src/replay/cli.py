@@ -83,7 +83,9 @@ def _parser() -> argparse.ArgumentParser:
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
     synth.add_argument(
-        "kind", choices=["demo", "broadcast", "wearable", "footage"], help="a shipped play, or any footage"
+        "kind",
+        choices=["demo", "broadcast", "wearable", "footage", "headform"],
+        help="a shipped play, any footage, or a headform's record of --motion",
     )
     synth.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for the play")
     synth.add_argument(
@@ -310,6 +312,8 @@ def _run_tool(arguments: argparse.Namespace) -> int:
         "synth": lambda: (
             tools.write_synthetic_footage(vars(arguments))
             if arguments.kind == "footage"
+            else tools.write_headform_record(arguments.motion, arguments.into, arguments.seed)
+            if arguments.kind == "headform"
             else tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed)
         ),
         "digitize": lambda: tools.digitise_video(

@@ -29,6 +29,8 @@ _COLOURS = {
     "shell": "#2f4b7c",
     "facemask": "#8d99ae",
     "chin_cup": "#e07a3f",
+    "bone": "#efe6cf",
+    "flesh": "#c98f6b",
 }
 _LIGHT = np.array([-0.35, 0.45, 0.82])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from replay.files import write_json
+from replay.files import read_json, write_json
 from replay.gates import fidelity_gate
 from replay.measures import Motion, fidelity
 from replay.motion import DRIVER
@@ -38,10 +38,18 @@ _QUANTITIES = ("linear_acceleration", "angular_acceleration", "angular_velocity"
 
 
 def skull_motion(stage: Stage, player: int = 1) -> Motion:
-    """Motion of a player's skull, from the solver's histories."""
+    """Motion of a player's skull at the head's centre of gravity, from the solver's histories.
+
+    A driven skull is told of that point; a free one is told of its own centre of gravity.
+    """
     parts = replayed_model(stage).parts
     skull = next(part.pid for part in parts if part.role == "skull" and part.player == player)
-    return Motion.from_history(pd.read_csv(stage.read("replay", "histories.csv")), skull)
+    motion = Motion.from_history(pd.read_csv(stage.read("replay", "histories.csv")), skull)
+    if not stage.made("placement", "placement.json"):
+        return motion
+    players = read_json(stage.read("placement", "placement.json"))["players"]
+    role = next(name for name, number in ROLES.items() if number == player)
+    return motion.of_point(players[role]["head_cg_m"])
 
 
 def _judged(entry: dict[str, object]) -> dict[str, object]:

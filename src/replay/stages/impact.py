@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from replay.errors import InstabilityError, ResumeError
 from replay.files import read_json
 from replay.gates import Gate, numerics_gate, part_energies
-from replay.measures import BrainRecorder, DamageRecorder
+from replay.measures import BrainRecorder, DamageRecorder, PadRecorder
 from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
@@ -39,6 +39,7 @@ BRAIN_FILES = {
     "element_peaks.csv": "peaks of every brain element",
     "brain_snapshots.h5": "strain of every brain element over time",
 }
+PAD_FILES = {"pads.csv": "compression of the helmets' pads over time"}
 DAMAGE_FILES = {
     "brain_damage.csv": "damaged volume of the brain by region over time",
     "element_damage.csv": "damage of every brain element and its onset",
@@ -83,8 +84,8 @@ def run_play(
     else:
         driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
         problem = driven_problem(model, driver, controls, play.solver.contact)
-    files = {**RUN_FILES, **BRAIN_FILES}
-    recorders: list[Recorder] = [brain_recorder(model)]
+    files = {**RUN_FILES, **BRAIN_FILES, **PAD_FILES}
+    recorders: list[Recorder] = [brain_recorder(model), pad_recorder(model)]
     if has_damage(model):
         recorders.append(damage_recorder(model))
         files |= DAMAGE_FILES
@@ -121,6 +122,13 @@ def run_solver(
 def brain_recorder(model: Model) -> BrainRecorder:
     """Recorder of the brain's elements with their regions."""
     return BrainRecorder(*_brain(model))
+
+
+def pad_recorder(model: Model) -> PadRecorder:
+    """Recorder of all pads and chin cups."""
+    roles = ("comfort_pad", "energy_pad", "chin_cup")
+    pads = {p.name: np.flatnonzero(model.element_part == k) for k, p in enumerate(model.parts) if p.role in roles}
+    return PadRecorder(pads)
 
 
 def has_damage(model: Model) -> bool:

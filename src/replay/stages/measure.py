@@ -16,10 +16,13 @@ from replay.measures import (
     head_measures,
     kinetic_energy_of,
     mechanical_action,
+    pad_summary,
     regional_summary,
     write_action,
 )
+from replay.motion import Kinematics
 from replay.stages.fidelity import skull_motion
+from replay.stages.forces import forces
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import has_damage, replayed_model
 from replay.stages.verdict import limits_of
@@ -60,6 +63,7 @@ def run(workspace: Workspace) -> str | None:
         path = stage.write("damage_volume.csv", "damaged volume by region against time and action", unit="m^3")
         DAMAGE_VOLUME_TABLE.write(path, {name: found[name] for name in DAMAGE_VOLUME_TABLE.names})
         damage = damage_summary(found)
+    _head_motion(stage)
     write_json(
         stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
         {
@@ -67,6 +71,8 @@ def run(workspace: Workspace) -> str | None:
             "head": head_measures(in_head_axes(skull_motion(stage)), file="replay/histories.csv"),
             "brain": regional_summary(brain),
             "damage": damage,
+            **forces(stage, model),
+            "pads": pad_summary(pd.read_csv(stage.read("replay", "pads.csv"))),
             "brain_convergence_class": convergence_class(gate),
             "action": {
                 "unit": "J s",
@@ -79,6 +85,20 @@ def run(workspace: Workspace) -> str | None:
         },
     )
     return stage.finish()
+
+
+def _head_motion(stage: Stage) -> None:
+    """Write the struck head's motion in the format of the reconstruction, to be compared or filmed again."""
+    m = skull_motion(stage)
+    Kinematics(
+        m.time_s,
+        m.position_m,
+        Rotation.from_quat(m.quaternion),
+        m.velocity_m_per_s,
+        m.acceleration_m_per_s2,
+        m.angular_velocity_rad_per_s,
+        m.angular_acceleration_rad_per_s2,
+    ).write(stage.write("head_motion.csv", "motion of the struck head's CG, in the format of kinematics.csv"))
 
 
 def _crossover(time: np.ndarray, head: np.ndarray, other: np.ndarray) -> dict[str, float | None]:

@@ -12,7 +12,7 @@ from replay import __version__
 from replay.files import read_json
 from replay.gates import Limits
 from replay.measures import Motion, read_snapshots
-from replay.models import Model
+from replay.models import Model, read_model
 from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
@@ -91,7 +91,7 @@ def collect(stage: Stage) -> ReportInput:
     limits = limits_of(stage)
     inputs = read_json(stage.read("inputs", "inputs.json"))
     quality = read_json(stage.read("reconstruction", "quality.json"))
-    model = replayed_model(stage)
+    model = read_model(stage.read("assembly", "model.h5"))
     known: dict[str, Any] = {
         "play": _play_facts(play, quality, model.info["helmet"]["chosen"]),
         "verdict": read_json(stage.read("verdict", "verdict.json")),
@@ -133,7 +133,8 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     measures = read_json(stage.read("measures", "measures.json"))
     tracked = 1 if play.collision is None else ROLES[play.collision.tracked]
     applied = skull_motion(stage, tracked)
-    fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
+    scene = replayed_model(stage)
+    fluid = {p.pid for p in scene.parts if scene.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
     damaged = stage.made("measures", "damage_volume.csv")
     return {
@@ -143,7 +144,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "energy": _table(stage, "replay", "energy.csv"),
         "timestep": _table(stage, "replay", "timestep.csv").query("step > 0"),
         "part_energy": energy.assign(fluid=energy["pid"].isin(fluid)),
-        "contact": _contact(stage),
+        "contact": measures["contact"]["pairs"],
         "head_measures": measures["head"],
         "brain_histories": _table(stage, "replay", "brain_histories.csv"),
         "convergence_class": measures["brain_convergence_class"],
@@ -153,29 +154,6 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
     }
-
-
-def _contact(stage: Stage) -> list[dict[str, Any]]:
-    """Pairs of parts that touched, the one with the greatest force first; none where nothing can touch."""
-    if not stage.made("replay", "contact.csv"):
-        return []
-    table = _table(stage, "replay", "contact.csv")
-    rows = []
-    for (first, second), pair in table.groupby(["part_a", "part_b"], sort=False):
-        force = np.sqrt((pair[["force_x_N", "force_y_N", "force_z_N"]].to_numpy() ** 2).sum(axis=1))
-        last = pair.iloc[-1]
-        impulse = np.sqrt((last[["impulse_x_N_s", "impulse_y_N_s", "impulse_z_N_s"]].to_numpy(float) ** 2).sum())
-        rows.append(
-            {
-                "first": first,
-                "second": second,
-                "peak_force_N": float(force.max()),
-                "impulse_N_s": float(impulse),
-                "normal_J": float(last["normal_J"]),
-                "friction_J": float(last["friction_J"]),
-            }
-        )
-    return sorted(rows, key=lambda row: -row["peak_force_N"])
 
 
 def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:
@@ -332,13 +310,16 @@ def _parameters(model: Model) -> list[dict[str, Any]]:
 
 
 def _mesh(model: Model) -> MeshView:
+    """Head and helmet, without the body that they may hang on."""
     roles = np.array([part.role for part in model.parts])
-    return MeshView(model.nodes, model.hexes, roles[model.element_part])
+    shown = ~model.elements_of(assembly="body")
+    return MeshView(model.nodes, model.hexes[shown], roles[model.element_part[shown]])
 
 
 def _snapshots(stage: Stage, model: Model) -> Snapshots:
     time, ids, values = read_snapshots(stage.read("replay", "brain_snapshots.h5"))
-    row = {int(number): k for k, number in enumerate(model.element_ids)}
+    shown = model.element_ids[~model.elements_of(assembly="body")]
+    row = {int(number): k for k, number in enumerate(shown)}
     return Snapshots(time, np.array([row[int(i)] for i in ids]), values)
 
 
