@@ -153,6 +153,30 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "action": _table(stage, "measures", "action.csv"),
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
+        "pads": measures["pads"],
+        **_collided(stage, measures),
+    }
+
+
+def _collided(stage: Stage, measures: dict[str, Any]) -> dict[str, Any]:
+    """What only two players have: how they met, the force between them, and published numbers beside theirs."""
+    if not stage.made("placement", "placement.json"):
+        return {}
+    head = {entry["name"]: entry["value"] for entry in measures["head"]}
+    masses = read_json(stage.read("assembly", "mass_properties.json"))["assemblies"]
+    damage = measures["damage"]
+    return {
+        "scene": stage.read("placement", "preview.png").read_bytes(),
+        "blow": _table(stage, "measures", "blow_force.csv") if stage.made("measures", "blow_force.csv") else None,
+        "published": {
+            "closing_speed_m_per_s": read_json(stage.read("placement", "placement.json"))["closing_speed_m_per_s"],
+            **{name: head[name] for name in head if name.startswith("peak_")},
+            "crossover_time_s": measures["action"]["crossover_time_s"],
+            "head_action_J_s": measures["action"]["head"],
+            "damage_onset_s": damage["brain"]["onset_phi_0.001_s"] if damage else None,
+            "head_mass_kg": masses["head"]["mass_kg"],
+            "helmet_mass_kg": masses["helmet"]["mass_kg"],
+        },
     }
 
 
@@ -237,6 +261,8 @@ def _table_two(stage: Stage, limits: Limits) -> list[dict[str, Any]]:
 def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
     """The article's Table 3: what was reconstructed at the start of the window, and what the model started with."""
     told = read_json(stage.read("driver", "initial_velocity.json"))
+    if stage.made("placement", "placement.json"):
+        return _two_starts(stage, told)
     return [
         {
             "item": item,
@@ -249,6 +275,23 @@ def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
             ("angular velocity", "rad/s", "omega_rad_per_s", applied.angular_velocity_rad_per_s),
         )
     ]
+
+
+def _two_starts(stage: Stage, told: dict[str, Any]) -> list[dict[str, Any]]:
+    """Table 3 of two players; the reconstruction shows one of them."""
+    collision = read_settings(stage).collision
+    players = read_json(stage.read("placement", "placement.json"))["players"]
+    rows = []
+    for role, start in players.items():
+        seen = collision is not None and role == collision.tracked
+        axis = np.array(start["Q_global_m"]) - np.array(start["P_global_m"])
+        omega = start["omega_rad_per_s"] * axis / np.sqrt(axis @ axis)
+        for item, unit, key, applied in (
+            (f"velocity of the {role}", "m/s", "velocity_m_per_s", start["velocity_m_per_s"]),
+            (f"angular velocity of the {role}", "rad/s", "omega_rad_per_s", omega.tolist()),
+        ):
+            rows.append({"item": item, "unit": unit, "reconstruction": told[key] if seen else None, "applied": applied})
+    return rows
 
 
 def _columns(motion: Motion) -> pd.DataFrame:
