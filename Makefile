@@ -6,6 +6,7 @@
 #   make quick             the suite without its slow tests
 #   make check             formatting, lint, types, spelling, workflow lint
 #   make bench             speed: element cycles, roofline, peers where installed, start-up; an idle machine, please
+#   make season            every play of config/plays.tsv: results/index.html (RESOLUTION=tiny|coarse)
 #   make accuracy          both modes of reconstruction on motions of known truth; the table of docs/accuracy.md (long)
 #   make report            the workflow's own report (needs a finished run)
 #   make lock              resolve environment.lock again from pyproject.toml (needs uv)
@@ -26,12 +27,15 @@ READY := $(VENV)/.ready
 # Two files of tests at a time; a file stays with one worker, which shares its fixtures.
 SIDE_BY_SIDE := -n 2 --dist loadfile
 
-.PHONY: run test quick check bench accuracy report lock clean distclean install
+.PHONY: run season test quick check bench accuracy report lock clean distclean install
 .DEFAULT_GOAL := run
 
 run: $(READY)
 	$(IN) snakemake results/$(PLAY)/bundle/$(PLAY).zip $(CONFIG)
 	@$(IN) replay verdict results/$(PLAY)
+
+season: $(READY)
+	$(IN) snakemake season --keep-going $(CONFIG)
 
 test: $(READY)
 	$(IN) pytest $(SIDE_BY_SIDE)

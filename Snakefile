@@ -12,19 +12,17 @@ include: "workflow/rules/common.smk"
 container: "container/replay.sif"
 
 
+# A play, or a member of an ensemble of it: demo.friction/003.
 wildcard_constraints:
-    play=r"[a-z0-9_-]+",
+    play=rf"{PLAY}(\.{PLAY}/[0-9]+)?",
 
 
 localrules:
     all,
-    settings,
-    inputs,
-    drive,
-    decks,
-    fidelity,
-    verdict,
-    seal,
+    write_out,
+    season,
+    ensembles,
+    bands,
 
 
 # ---------------------------------------------------------------- targets
@@ -38,7 +36,16 @@ include: "workflow/rules/reconstruction.smk"
 include: "workflow/rules/model.smk"
 include: "workflow/rules/replay.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/many.smk"
+
+
+share_compiled_kernels()
 
 
 onstart:
     hold_results_lock()
+
+
+# A play that failed keeps the season's table from being a job's: what there is, is written all the same.
+onerror:
+    shell(f"replay season {' '.join(SEASON)}")

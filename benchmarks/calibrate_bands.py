@@ -1,36 +1,37 @@
 """Make ``src/replay/motion/data/bands.yaml``: the constants under which the bands cover.
 
-    python benchmarks/calibrate_bands.py collect FILE.jsonl [CLIPS]   # slow; goes on where it stopped
-    python benchmarks/calibrate_bands.py fit FILE.jsonl               # writes bands.yaml
+    python benchmarks/calibrate_bands.py collect FILE.jsonl [FIRST LAST]   # slow; goes on where it stopped
+    python benchmarks/calibrate_bands.py fit FILE.jsonl...                 # writes bands.yaml
 
-Motions come from the building families only (`replay.motion.families.BUILDING`), footage at random from the ranges
-below. The accuracy suite tests on other families and other seeds.
+Motions come from the building families only (`replay.motion.synthetic.families.BUILDING`), footage at random from the
+ranges below. The accuracy suite tests on other families and other seeds.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 
 import numpy as np
 import yaml
-from footage import Footage, both_modes, film, true_peaks
+from footage import Clip, View, clip_of
+from measured import Row, collect, kept_spread, rows_of
+from scipy.optimize import minimize_scalar
 
-from replay.motion.bands import CONSTANTS_FILE, CURVES, QUANTITIES, RATIOS, spread
-from replay.motion.families import BUILDING
+from replay.motion.bands import BEFORE, CONSTANTS_FILE, CURVES, RATIOS, level_set
+from replay.motion.synthetic.families import BUILDING
 
 LEVEL = 0.95
-CLIPS = 134
+CLIPS = 600
 RANGES = {"fps": (59.94, 239.76), "landmarks": (4.0, 10.0), "px_per_m": (120.0, 2500.0), "sigma_px": (0.7, 4.0)}
 
 
-def footage_of(seed: int) -> Footage:
+def view_of(seed: int) -> View:
     """Footage at random: half of it at 59.94 fps, where it is needed most."""
     rng = np.random.default_rng([7, seed])
     px_per_m = float(np.exp(rng.uniform(np.log(120.0), np.log(2500.0))))
-    return Footage(
-        fps=float(rng.choice([59.94, 119.88, 239.76], p=[0.6, 0.2, 0.2])),
+    return View(
+        fps=float(rng.choice([59.94, 119.88, 239.76], p=[0.5, 0.25, 0.25])),
         landmarks=int(rng.choice([4, 6, 8, 10])),
         sigma_px=float(np.exp(rng.uniform(np.log(0.7), np.log(4.0)))),
         px_per_m=px_per_m,
@@ -40,79 +41,108 @@ def footage_of(seed: int) -> Footage:
     )
 
 
-def collect(path: Path, clips: int) -> None:
-    """Append one line a clip: truth and spread of every peak, scaled errors of every curve."""
-    done = len(path.read_text().splitlines()) if path.exists() else 0
-    for seed in range(done, clips):
-        family = BUILDING[seed % len(BUILDING)]
-        clip = film(footage_of(seed), family, 100_000 + seed)
-        _, posterior = both_modes(clip)
-        truth, time = true_peaks(clip, posterior)
-        margin = 1.0 / clip.camera.fps
-        peaks = posterior.draws.peaks(margin)
-        row = {"family": family, "seed": seed, "fps": clip.camera.fps, "peaks": {}, "curves": {}}
-        for name in QUANTITIES:
-            found = spread(name, peaks[name])
-            true = np.log(truth[name]) if name in RATIOS else truth[name]
-            row["peaks"][name] = [float(true), found.centre, found.width]
-        k, d = clip.truth.at(time), posterior.draws
-        steps = (len(time) - 1) // (len(posterior.frames_s) - 1) if len(posterior.frames_s) <= 120 else 1
-        for name, true, drawn in (
-            ("omega", k.omega_rad_per_s, d.omega_rad_per_s),
-            ("alpha", k.alpha_rad_per_s2, d.alpha_rad_per_s2),
-            ("a", k.acceleration_m_per_s2, d.acceleration_m_per_s2),
-        ):
-            scaled = np.abs(drawn.mean(axis=0) - true) / drawn.std(axis=0)
-            row["curves"][name] = float(np.quantile(scaled[steps:-steps:steps], LEVEL))
-        with path.open("a") as out:
-            out.write(json.dumps(row) + "\n")
+def filmed(seed: int) -> tuple[str, Clip]:
+    """Family and clip of a seed."""
+    family = BUILDING[seed % len(BUILDING)]
+    return family, clip_of(view_of(seed), family, 100_000 + seed)
 
 
-def fit(path: Path) -> None:
-    """Shift by the median error and widen to the conformal quantile, by thirds of the posterior's width."""
-    rows = [json.loads(line) for line in path.read_text().splitlines()]
-    peaks = {name: _fit_peak(np.array([r["peaks"][name] for r in rows])) for name in QUANTITIES}
-    curves = {name: float(np.quantile([r["curves"][name] for r in rows], 0.8)) for name in CURVES}
+def fit(paths: list[Path]) -> None:
+    """Constants of every quantity at every rate."""
+    rows = [row for path in paths for row in rows_of(path)]
+    rates = sorted({row["fps"] for row in rows})
+    by_rate = [[row for row in rows if row["fps"] == rate] for rate in rates]
     content = {
         "made_by": "benchmarks/calibrate_bands.py",
-        "clips": len(rows),
+        "clips": [len(some) for some in by_rate],
         "level": LEVEL,
         "families": list(BUILDING),
         "calibrated": {name: list(bounds) for name, bounds in RANGES.items()},
-        "peaks": peaks,
-        "curves": {name: round(value, 3) for name, value in curves.items()},
+        "rates": rates,
+        "peaks": {
+            **{name: [_fit_peak(name, some) for some in by_rate] for name in RATIOS},
+            # its width is in seconds, so that frame rates share their clips
+            "onset_s": [_fit_peak("onset_s", rows) for _ in rates],
+        },
+        "curves": {name: [_fit_curve(name, some) for some in by_rate] for name in CURVES},
+        "before": {name: _fit_before(name, rows) for name in BEFORE},
+        "instant": (level := _fit_instant(rows)),
+        "instant_odds": _fit_odds(rows, level),
     }
-    CONSTANTS_FILE.parent.mkdir(exist_ok=True)
     header = (
         "# Constants of the calibrated bands; made by benchmarks/calibrate_bands.py, read by replay.motion.bands.\n"
     )
     CONSTANTS_FILE.write_text(header + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110))
 
 
-def _fit_peak(table: np.ndarray) -> dict[str, list[float]]:
-    """Constants of one quantity.
-
-    The thirds tell how the error grows with the width (median and 80th percentile, which a few clips settle); all
-    clips together tell how far 95 % of the truths reach in that measure, by the conformal rank.
-    """
-    true, centre, width = table.T
-    thirds = np.array_split(np.argsort(width), 3)
-    shift = np.array([np.median((true[third] - centre[third]) / width[third]) for third in thirds])
-    reach, score = np.empty(3), np.empty(len(true))
-    for i, third in enumerate(thirds):
-        off = np.abs((true[third] - centre[third]) / width[third] - shift[i])
-        reach[i] = np.quantile(off, 0.8)
-        score[third] = off / reach[i]
+def _reach(score: np.ndarray, level: float = LEVEL) -> float:
+    """What a share of the scores does not exceed, by the conformal rank."""
     n = len(score)
-    factor = float(np.sort(score)[min(n - 1, int(np.ceil((n + 1) * LEVEL)) - 1)])
-    out = {"widths": [float(np.median(width[third])) for third in thirds], "shift": shift, "reach": factor * reach}
-    return {name: [round(float(v), 6 if name == "widths" else 3) for v in values] for name, values in out.items()}
+    return float(np.sort(score)[min(n - 1, int(np.ceil((n + 1) * level)) - 1)])
+
+
+def _fit_peak(name: str, rows: list[Row]) -> dict[str, list[float]]:
+    """Shift by the median error and widen to the conformal quantile, by thirds of the posterior's width.
+
+    The thirds tell how the error grows with the width (median and 90th percentile, which a few clips settle); all
+    clips together tell how far 97.5 % of the truths reach to either side in that measure, by the conformal rank.
+    """
+    rows = [row for row in rows if name in row["draws"]]
+    found = [kept_spread(name, row) for row in rows]
+    centre, width = np.array([s.centre for s in found]), np.array([s.width for s in found])
+    true = np.array([row["truth"][name] for row in rows])
+    error = ((np.log(true) if name in RATIOS else true) - centre) / width
+    thirds = np.array_split(np.argsort(width), 3)
+    out = {"widths": [np.median(width[third]) for third in thirds], "shift": [np.median(error[t]) for t in thirds]}
+    for side, sign in (("below", -1.0), ("above", 1.0)):
+        off = [sign * (error[third] - middle) for third, middle in zip(thirds, out["shift"])]
+        reach = np.array([np.quantile(some, 0.9) for some in off])
+        score = np.concatenate([some / far for some, far in zip(off, reach)])
+        out[side] = list(_reach(score, 0.5 + 0.5 * LEVEL) * reach)
+    return {key: [round(float(v), 6 if key == "widths" else 3) for v in values] for key, values in out.items()}
+
+
+def _fit_curve(name: str, rows: list[Row]) -> float:
+    """Factor under which the curve lies inside its band in 95 % of a clip's frames, in four clips of five."""
+    return round(float(np.quantile([np.quantile(row["scaled"][name], LEVEL) for row in rows], 0.8)), 3)
+
+
+def _fit_before(name: str, rows: list[Row]) -> float:
+    """Factor for a component of a velocity before the impact."""
+    scaled = [np.divide(r["before"][name], r["before"][f"sigma_{name}"]) for r in rows if "before" in r]
+    return round(_reach(np.abs(np.ravel(scaled))), 3)
+
+
+def _fit_instant(rows: list[Row]) -> float:
+    """Least relative acceleration, over its greatest, in which 95 % of the true t0 lie."""
+    curves = [_instant(row) for row in rows]
+    return round(-_reach(-np.array([curve[at] / curve.max() for curve, at in curves])), 4)
+
+
+def _instant(row: Row) -> tuple[np.ndarray, int]:
+    """Relative acceleration on its grid, and the index of the true t0."""
+    start, step = row["t0"]["time_s"]
+    return np.array(row["t0"]["relative_alpha"]), round((row["truth"]["t0_s"] - start) / step)
+
+
+def _fit_odds(rows: list[Row], level: float) -> float:
+    """Power under which the lobes that hold the true t0 are likeliest among those that compete."""
+    heights = []
+    for row in rows:
+        curve, at = _instant(row)
+        pieces = level_set(curve, level)
+        tops = np.array([curve[a:b].max() for a, b in pieces])
+        heights += [tops / top for top, (a, b) in zip(tops, pieces) if len(tops) > 1 and a <= at < b]
+    # log of a lobe's chance: of h^k over the sum of all
+    fitted = minimize_scalar(lambda k: sum(np.log(np.sum(h**k)) for h in heights), bounds=(0.0, 30.0), method="bounded")
+    return round(float(fitted.x), 2)
 
 
 if __name__ == "__main__":
     if len(sys.argv) < 3 or sys.argv[1] not in ("collect", "fit"):
         raise SystemExit(__doc__)
-    if sys.argv[1] == "collect":
-        collect(Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else CLIPS)
+    if sys.argv[1] == "fit":
+        fit([Path(name) for name in sys.argv[2:]])
     else:
-        fit(Path(sys.argv[2]))
+        first, last = (int(v) for v in sys.argv[3:5]) if len(sys.argv) > 4 else (0, CLIPS)
+        collect(Path(sys.argv[2]), range(first, last), filmed)

@@ -164,14 +164,19 @@ def main() -> None:
         numba.set_num_threads(1)
         peer = plain_rate(n)
         print(f"\n{n**3} elements; million element cycles per second, best of {ROUNDS}; plain elastic loop {peer:.2f}")
-        print(f"{'law':>20} {'1 thread':>10} {'x plain':>8} {f'{most} threads':>10} {'gain':>6}")
+        print(
+            f"{'law':>20} {'1 thread':>10} {'x plain':>8} {f'{most} threads':>10} {'gain':>6} {'cost over elastic':>18}"
+        )
+        elastic: tuple[float, ...] = ()
         for law in MATERIALS:
             run = block(law, n)
             one = best_rate(lambda count, run=run: steps(run, count), n**3)
             numba.set_num_threads(most)
             many = best_rate(lambda count, run=run: steps(run, count), n**3)
             numba.set_num_threads(1)
-            print(f"{law:>20} {one:10.2f} {one / peer:8.1f} {many:10.2f} {many / one:6.2f}")
+            elastic = elastic or (one, many)
+            cost = f"{elastic[0] / one:.2f} / {elastic[1] / many:.2f}"
+            print(f"{law:>20} {one:10.2f} {one / peer:8.1f} {many:10.2f} {many / one:6.2f} {cost:>18}")
 
 
 if __name__ == "__main__":

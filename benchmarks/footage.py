@@ -1,4 +1,4 @@
-"""Synthetic footage for the calibration of the bands and for the accuracy suite: one clip from one seed."""
+"""Clips of known truth for the calibration of the bands and for the accuracy suite: one clip from one seed."""
 
 from __future__ import annotations
 
@@ -7,29 +7,27 @@ from pathlib import Path
 
 import numpy as np
 
-from replay.motion.families import Truth, draw
 from replay.motion.focal import ClipFocal
 from replay.motion.pose import Poses
 from replay.motion.posterior import PosteriorMotion, reconstruct_posterior
 from replay.motion.protocol import ProtocolMotion, reconstruct_clicks
-from replay.motion.settings import CameraSettings, Cutoffs
-from replay.motion.synthetic import HEAD_SIZED_OFFSET_M, LANDMARKS, SyntheticCamera
-from replay.motion.tracks import Template, Tracks
+from replay.motion.settings import CameraSettings
+from replay.motion.synthetic import TEN, Flaws, Footage, Motion, SyntheticCamera, film
+from replay.motion.synthetic.families import draw
 
 RECORDS = Path(__file__).parents[2] / "shared" / "real" / "mouthguard"
-POINTS = {**LANDMARKS, "LM9": (0.165, 0.060, -0.010), "LM10": (0.165, -0.060, -0.010)}
-"""Ten points of a helmet [m]."""
 CHOSEN = {
-    3: ("LM1", "LM2", "LM3"),
+    3: TEN[:3],
     4: ("LM1", "LM2", "LM3", "LM5"),
     6: ("LM1", "LM2", "LM3", "LM4", "LM5", "LM8"),
-    8: tuple(LANDMARKS),
-    10: tuple(POINTS),
+    8: TEN[:8],
+    10: TEN,
 }
+"""Landmarks by their number."""
 
 
 @dataclass(frozen=True)
-class Footage:
+class View:
     """What a clip is filmed with.
 
     Parameters
@@ -44,9 +42,9 @@ class Footage:
 
     fps: float = 59.94
     landmarks: int = 6
-    sigma_px: float = 2.7
-    px_per_m: float = 150.0
-    distance_m: float = 45.0
+    sigma_px: float = 1.0
+    px_per_m: float = 300.0
+    distance_m: float = 30.0
     occluded: float = 0.0
     outliers: float = 0.0
     zoom_per_s: float = 0.0
@@ -54,69 +52,39 @@ class Footage:
 
 @dataclass(frozen=True)
 class Clip:
-    """One clip with its truth; `times` are the true times of the frames."""
+    """A motion, what was filmed of it, and the camera file: the distance is known to 2 %."""
 
-    truth: Truth
-    times: np.ndarray
-    tracks: Tracks
-    template: Template
-    camera: CameraSettings
-    focal_px: float
+    motion: Motion
+    footage: Footage
+    settings: CameraSettings
+
+    @property
+    def times(self) -> np.ndarray:
+        """True times of the frames [s]; the clip's own clock begins at the first."""
+        return self.footage.camera.times
 
 
-def film(footage: Footage, family: str, seed: int, *, quiet: bool = False) -> Clip:
-    """Film one motion of a family."""
+def clip_of(view: View, family: str, seed: int, *, quiet: bool = False) -> Clip:
+    """Film one motion of a family; `quiet` leaves its impact out."""
     rng = np.random.default_rng([seed, *family.encode()])
-    half = max(12, round(0.15 * footage.fps))
-    names = CHOSEN[footage.landmarks]
-    focal = footage.px_per_m * footage.distance_m
-    seen_by = SyntheticCamera(
-        footage.fps, -half, half, (3840, 2160), focal, footage.sigma_px, float(rng.random()), names
+    half = max(12, round(0.15 * view.fps))
+    camera = SyntheticCamera(
+        view.fps,
+        -half,
+        half,
+        (3840, 2160),
+        view.px_per_m * view.distance_m,
+        view.sigma_px,
+        phase=float(rng.random()),
+        landmarks=CHOSEN[view.landmarks],
+        zoom_per_s=view.zoom_per_s,
     )
-    position = np.array([rng.uniform(-1, 1), footage.distance_m, rng.uniform(-0.5, 0.5)])
-    span = (float(seen_by.times[0]), float(seen_by.times[-1]))
-    truth = draw(family, rng, span, position, records=RECORDS, quiet=quiet)
-    points = np.array([POINTS[name] for name in names])
-    pixels = seen_by.see(truth.at(seen_by.times), points, np.array(HEAD_SIZED_OFFSET_M))
-    if footage.zoom_per_s:
-        middle = np.array([1920.0, 1080.0])
-        pixels = middle + (pixels - middle) * np.exp(footage.zoom_per_s * seen_by.times)[:, None, None]
-    pixels = pixels + rng.normal(0.0, footage.sigma_px, pixels.shape)
-    wild = rng.random(pixels.shape[:2]) < footage.outliers
-    pixels[wild] += (
-        rng.uniform(8.0, 25.0, (wild.sum(), 1)) * footage.sigma_px * _unit(rng.standard_normal((wild.sum(), 2)))
-    )
-    if footage.occluded:
-        pixels[_hidden(rng, pixels.shape[:2], footage.occluded)] = np.nan
-    camera = CameraSettings(
-        fps=footage.fps,
-        principal_point=(1920.0, 1080.0),
-        cutoffs=Cutoffs(),
-        helmet_to_com=HEAD_SIZED_OFFSET_M,
-        camera_distance_m=footage.distance_m,
-        camera_distance_sigma_m=0.02 * footage.distance_m,
-        lens="zoom" if footage.zoom_per_s else "fixed",
-        click_sigma_px=footage.sigma_px,
-    )
-    return Clip(truth, seen_by.times, Tracks(np.arange(len(pixels)), pixels), Template(names, points), camera, focal)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-
-
-def _hidden(rng: np.random.Generator, shape: tuple[int, int], share: float) -> np.ndarray:
-    """Runs of three to eight frames in which a landmark is behind something; three are left in every frame."""
-    hidden = np.zeros(shape, dtype=bool)
-    for _ in range(1000):
-        if hidden.mean() >= share:
-            break
-        first, landmark = rng.integers(shape[0]), rng.integers(shape[1])
-        tried = hidden.copy()
-        tried[first : first + rng.integers(3, 9), landmark] = True
-        if (~tried).sum(axis=1).min() >= 3:
-            hidden = tried
-    return hidden
+    position = np.array([rng.uniform(-1, 1), view.distance_m, rng.uniform(-0.5, 0.5)])
+    span = (float(camera.times[0]), float(camera.times[-1]))
+    motion = draw(family, rng, span, position, records=RECORDS, quiet=quiet)
+    flaws = Flaws(outlier_share=view.outliers, outlier_px=15.0 * view.sigma_px, occluded_share=view.occluded)
+    footage = film(motion, camera, seed=seed, flaws=flaws)
+    return Clip(motion, footage, footage.settings(distance_sigma=0.02))
 
 
 def both_modes(clip: Clip) -> tuple[ProtocolMotion, PosteriorMotion]:
@@ -126,26 +94,8 @@ def both_modes(clip: Clip) -> tuple[ProtocolMotion, PosteriorMotion]:
     advantage, if any, over what the distance known to 2 % would tell it. Posterior mode takes the distance.
     """
     none = np.zeros(0)
-    focal = ClipFocal(float(np.log(clip.focal_px)), 0.02, 1.0, Poses(none, none, none, none, none))
-    protocol = reconstruct_clicks(clip.tracks, clip.template, clip.camera, clip=focal)
-    return protocol, reconstruct_posterior(clip.tracks, clip.template, clip.camera, protocol)
-
-
-def true_peaks(clip: Clip, posterior: PosteriorMotion) -> tuple[dict[str, float], np.ndarray]:
-    """Peaks of the continuous motion within the clip, t0 on the clip's clock, and the grid in true time."""
-    draws = posterior.draws
-    shift = float(clip.times[0]) - float(clip.tracks.frames[0]) / clip.camera.fps
-    margin = 1.0 / clip.camera.fps
-    time = np.clip(draws.time_s + shift, clip.times[0], clip.times[-1])
-    inner = time[(draws.time_s >= draws.time_s[0] + margin) & (draws.time_s <= draws.time_s[-1] - margin)]
-    k = clip.truth.at(inner)
-    along = k.acceleration_m_per_s2 @ draws.ray
-    across = np.linalg.norm(k.acceleration_m_per_s2 - along[:, None] * draws.ray, axis=1)
-    return {
-        "omega_rad_per_s": float(k.omega_resultant.max()),
-        "alpha_rad_per_s2": float(k.alpha_resultant.max()),
-        "a_m_per_s2": float(k.linear_resultant.max()),
-        "a_across_m_per_s2": float(across.max()),
-        "a_along_m_per_s2": float(np.abs(along).max()),
-        "t0_s": float(inner[np.argmax(k.alpha_resultant)] - shift),
-    }, time
+    log_f = float(np.log(clip.footage.camera.focal_length_px))
+    focal = ClipFocal(log_f, 0.02, 1.0, Poses(none, none, none, none, none))
+    tracks, template = clip.footage.tracks, clip.footage.template
+    protocol = reconstruct_clicks(tracks, template, clip.settings, clip=focal)
+    return protocol, reconstruct_posterior(tracks, template, clip.settings, protocol)

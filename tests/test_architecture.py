@@ -12,6 +12,7 @@ LEAVES = {"controls", "documents", "errors", "files", "tables", "manifest", "pla
 MAY_IMPORT: dict[str, set[str]] = {
     "cli": {"stages", "doctor", *LEAVES},
     "doctor": set(LEAVES),
+    "sources": set(),
     "stages": {*ROOMS, "solver", "stages", *LEAVES},
     **{room: {room, "solver", *LEAVES} for room in ROOMS},
     "solver": {"solver", "errors", "files", "tables"},

@@ -138,6 +138,30 @@ def test_a_model_can_be_built_by_itself(plays: Path, capsys: pytest.CaptureFixtu
     assert Path("model.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_player_can_be_built_by_himself(
+    plays: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("lean.yaml").write_text("angles: {waist: {flexion: 20}, knee_left: {flexion: 30}}\n", encoding="utf-8")
+    assert main(["model", "--resolution", "tiny", "--body", "lean.yaml", "--mass", "90", "--out", "player.h5"]) == 0
+    told = capsys.readouterr().out
+    assert "body 1.85 m, 90 kg, lean, rigid segments, voxels of 40 mm" in told
+    assert "neck and head" in told
+    assert "90.000" in told.splitlines()[-1]
+    for arguments, message in (
+        (["--body", "lying"], "lying: is no posture and no file"),
+        (["--body", "standing", "--stature", "2.5"], "a stature [m] of 2.5; between 1.5 and 2.1 is possible"),
+        (["--body", "standing", "--voxel", "0.001"], "voxels of 0.001 m; between 0.015 and 0.045 m is possible"),
+        (["--body", "bent.yaml"], "bent.yaml: posture bent: knee_left flexion is 150 degrees"),
+        (["--body", "odd.yaml"], "odd.yaml"),
+    ):
+        Path("bent.yaml").write_text("angles: {knee: {flexion: 150}}\n", encoding="utf-8")
+        Path("odd.yaml").write_text("angel: {knee: {flexion: 150}}\n", encoding="utf-8")
+        assert main(["model", "--resolution", "tiny", *arguments, "--out", "other.h5"]) == 2
+        assert message in capsys.readouterr().err
+        assert not Path("other.h5").exists()
+
+
 def test_the_schema_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == 0
     assert '"$schema"' in capsys.readouterr().out
@@ -147,6 +171,7 @@ def test_the_doctor_says_one_line_for_each_thing(
     repository: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(repository)
+    monkeypatch.setattr("replay.doctor.shutil.which", lambda _: None)  # what Slurm there is, is tests/workflow's
     assert main(["doctor"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert {line.split()[1] for line in lines} >= {"python", "environment", "threads", "memory", "disk", "gpu"}

@@ -35,6 +35,7 @@ reads back to the same bits. This page is generated from the formats in the code
 | `assembly/` | `model.h5`, `parts.csv`, mass properties, inspection, preview, the helmet and assembly gates |
 | `placement/` | of a collision: `scene.h5` with both players, `placement.json`, its gate |
 | `decks/velodyne`, `decks/lsdyna`, `decks/openradioss` | the run decks of the same replay for other solvers |
+| `decks/replay` | a batch script for this program's own solver |
 | `shake/` | the helmet's millisecond of free flight and its gate |
 | `replay/` | the run: ledger, time steps, histories, states, brain, and the numerics gate |
 | `sensitivity/` | the same run at half the hourglass coefficient, and its gate |
@@ -44,6 +45,10 @@ reads back to the same bits. This page is generated from the formats in the code
 | `report/` | `report.html` |
 | `bundle/` | `<play>.zip` and its SHA-256 |
 | `logs/` | what the commands printed and how long they took: of one machine, never sealed |
+
+Beside the plays lie `index.html` and `plays.csv`, the season's page and table; `plays.d/<play>/`, a row of the table of
+plays written out as a play; and `<play>.<ensemble>/`: `001/` and on, the stages of each member that are its own
+(`settings/member.json` names those it shares), and `bands/` with `bands.csv`, `members.csv` and `ensemble.html`.
 
 ## Gates
 
@@ -55,7 +60,9 @@ something to say.
 
 `states.vtkhdf` is a temporal VTKHDF unstructured grid (ParaView 5.12 and later); `states.xdmf` names the same data
 for VisIt. `model.h5` holds the mesh as HDF5 datasets (`nodes/coordinates_m`, `elements/connectivity`, ...) and one
-JSON document with parts, sets, materials and notes.
+JSON document with parts, sets, materials and notes; of a player with a body also his joints (numbers of two rigid
+parts, centre, axes in rows, stiffness for positive and negative angles, damping ratios) and the names of node sets that
+move as one body.
 
 ## Tables
 """

@@ -32,8 +32,9 @@ _STAGES: dict[str, tuple[str, str]] = {
     "judge": ("verdict", "collect the gates into one verdict"),
     "report": ("report", "figures and the self-contained page"),
     "seal": ("seal", "the sealed bundle"),
+    "bands": ("bands", "bands of every measure over the members of an ensemble"),
 }
-_ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal")
+_ALWAYS_RUN = ("settings", "inputs", "judge", "report", "seal", "bands")
 _PULSES = ("sine_squared", "half_sine", "triangle", "skewed", "double")
 _UNITS = ("m-kg-s", "mm-tonne-s", "mm-kg-ms", "mm-g-ms", "cm-g-us", "cm-g-s", "in-lbf-s")
 _SOLVING = ("shake", "impact", "sensitivity")
@@ -58,6 +59,13 @@ def _parser() -> argparse.ArgumentParser:
                 choices=["as-the-play-says", "tiny", "coarse", "medium", "fine"],
                 help="override model.resolution of the play",
             )
+        if name in ("settings", "bands"):
+            command.add_argument(
+                "--ensemble",
+                type=Path,
+                metavar="FILE.ensemble.yaml",
+                help="description of the ensemble (default: the one beside its play)",
+            )
         if name not in _ALWAYS_RUN:
             command.add_argument(
                 "--carry-on",
@@ -80,6 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     verdict.add_argument("results", type=Path, help="results/<play>")
 
     _add_bundle_tools(commands)
+    _add_season(commands)
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
     synth.add_argument(
@@ -125,7 +134,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     digitize.add_argument("--patch", type=_positive, default=21, metavar="PX", help="side of the patch (default 21)")
 
-    model = commands.add_parser("model", help="build a head and helmet model by itself")
+    model = commands.add_parser("model", help="build a head and helmet model by itself, with --body a whole player")
     model.add_argument("--preset", default="nfl", choices=["anat", "nfl", "article"])
     model.add_argument("--resolution", default="coarse", choices=["tiny", "coarse", "medium", "fine"])
     for piece, text in (
@@ -141,6 +150,14 @@ def _parser() -> argparse.ArgumentParser:
         )
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
+    model.add_argument("--body", metavar="POSTURE", help="a body in this posture, by name or YAML file of joint angles")
+    model.add_argument("--stature", type=_above_0, default=1.85, metavar="M", help="of the body (default 1.85)")
+    model.add_argument("--mass", type=_above_0, default=110.0, metavar="KG", help="without helmet (default 110)")
+    model.add_argument("--muscle", type=_above_0, default=0.9, help="0.5 average, 1 most (default 0.9)")
+    model.add_argument(
+        "--tissue", choices=["rigid", "deformable"], default="rigid", help="flesh of the body's segments"
+    )
+    model.add_argument("--voxel", type=_above_0, metavar="M", help="edge of the body's hexes")
 
     solve = commands.add_parser(
         "solve",
@@ -194,7 +211,8 @@ def _parser() -> argparse.ArgumentParser:
     figures.add_argument("--threads", type=_positive, default=None, help="solver threads (default: all cores)")
     figures.add_argument("--out", type=Path, required=True, metavar="FOLDER")
 
-    commands.add_parser("doctor", help="check this machine and environment")
+    doctor = commands.add_parser("doctor", help="check this machine and environment, and the Slurm account")
+    doctor.add_argument("--node", action="store_true", help="also run a short Slurm job that checks a compute node")
     schema = commands.add_parser("schema", help="print the JSON schema of play.yaml")
     schema.add_argument("--out", type=Path, help="write it to a file instead")
     return parser
@@ -244,8 +262,20 @@ def _run_bundle_tool(arguments: argparse.Namespace) -> int:
     return tool(**given)
 
 
+def _add_season(commands: Any) -> None:
+    """Commands of the workflow over many plays."""
+    season = commands.add_parser("season", help="every play in one table and on one page")
+    season.add_argument("plays", nargs="+", metavar="PLAY")
+    season.add_argument("--results", type=Path, default=Path("results"), help="where results/<play> lies")
+    row = commands.add_parser("write-out", help="write a row of the table of plays as a play folder")
+    row.add_argument("play", help="name of the row")
+    row.add_argument("--table", type=Path, default=Path("config/plays.tsv"))
+    row.add_argument("--plays", type=Path, default=Path("config/plays"), help="folder of the described plays")
+    row.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="folder of the plays written out")
+
+
 def _add_workspace(command: argparse.ArgumentParser) -> None:
-    command.add_argument("play", help="name of the play: a folder of --plays")
+    command.add_argument("play", help="name of the play: a folder of --plays; or a member, demo.friction/003")
     command.add_argument("--plays", type=Path, default=Path("config/plays"), help="folder of the plays")
     command.add_argument("--results", type=Path, default=Path("results"), help="where results/<play> lies")
 
@@ -284,6 +314,8 @@ def _run_stage(arguments: argparse.Namespace) -> int:
     options: dict[str, object] = {}
     if arguments.command == "settings":
         options["resolution"] = None if arguments.resolution == "as-the-play-says" else arguments.resolution
+    if arguments.command in ("settings", "bands"):
+        options["ensemble"] = arguments.ensemble
     if arguments.command == "seal":
         options["interrupted"] = arguments.interrupted
     if arguments.command in _SOLVING:
@@ -302,6 +334,16 @@ def _run_helmet(arguments: argparse.Namespace) -> int:
     if arguments.action == "inspect":
         return helmet.inspect(arguments.files, out=arguments.json, **given)
     return helmet.prepare(arguments.files, helmet=arguments.helmet, out=arguments.out, **given)
+
+
+def _body(arguments: argparse.Namespace) -> dict[str, Any] | None:
+    """What `replay model` is told of a body; none without ``--body``."""
+    if arguments.body is None:
+        return None
+    return {
+        "posture": arguments.body, "stature_m": arguments.stature, "mass_kg": arguments.mass,
+        "muscle": arguments.muscle, "tissue": arguments.tissue, "step_m": arguments.voxel,
+    }  # fmt: skip
 
 
 def _run_tool(arguments: argparse.Namespace) -> int:
@@ -330,6 +372,7 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             (arguments.helmet, arguments.facemask, arguments.pads, arguments.chinstrap),
             arguments.out,
             arguments.preview,
+            _body(arguments),
         ),
         "solve": lambda: explicit.solve_model(
             arguments.model,
@@ -376,7 +419,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         if arguments.command == "doctor":
             from replay.doctor import examine
 
-            return examine()
+            return examine(on_a_node=arguments.node)
+        if arguments.command == "season":
+            from replay.stages.season import season
+
+            return season(arguments.plays, arguments.results)
+        if arguments.command == "write-out":
+            from replay.stages.write_out import write_row
+
+            return write_row(arguments.play, arguments.table, arguments.plays, arguments.into)
         if arguments.command in _BUNDLE_TOOLS:
             return _run_bundle_tool(arguments)
         return _run_stage(arguments) if arguments.command in _STAGES else _run_tool(arguments)

@@ -117,6 +117,13 @@ def load_json(path: Path, model: type[ModelT], *, context: Mapping[str, Any] | N
     return _validate(path, model, data, lines, twice, context)
 
 
+def check_settings(
+    file: Path, model: type[ModelT], data: Any, *, line: int | None = None, context: Mapping[str, Any] | None = None
+) -> ModelT:
+    """Check data that lie in no settings file of their own; every problem names `file`, `line` and the dotted path."""
+    return _validate(file, model, data, {} if line is None else {(): line}, [], context)
+
+
 def _too_deep(path: Path) -> InputError:
     return InputError(path, "nests brackets too deep to be read", mend="remove the brackets that are not closed")
 
@@ -274,14 +281,14 @@ def _resolve(model: type[BaseModel], data: Any, loc: Path_) -> tuple[Path_, type
         is_tag = isinstance(current, dict) and not tagged and bool(at) and current.get("kind") == part
         if is_tag:
             tagged = True
-            last = next((m for m in _models(last) if _tag(m) == part), None)
+            last = next((m for m in blocks_of(last) if _tag(m) == part), None)
             owner = last if isinstance(last, type) else owner
             continue
         if _is_label(part):
             continue
         tagged = False
         if isinstance(part, str):
-            inner = list(_models(last)) if at and last is not None else []
+            inner = list(blocks_of(last)) if at and last is not None else []
             if inner and not (isinstance(last, type) and last is owner):
                 owner = inner[0]
             info = owner.model_fields.get(part) if owner else None
@@ -296,12 +303,13 @@ def _resolve(model: type[BaseModel], data: Any, loc: Path_) -> tuple[Path_, type
     return tuple(at), owner
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+def blocks_of(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Settings models that an annotation admits."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     elif typing.get_origin(annotation) in (typing.Union, types.UnionType, Annotated):
         for inner in typing.get_args(annotation):
-            yield from _models(inner)
+            yield from blocks_of(inner)
 
 
 def _tag(model: type[BaseModel]) -> Any:

@@ -61,6 +61,7 @@ GOOD: dict[str, dict[str, Any]] = {
         "posterior_flip_margin": 40.0,
         "posterior_peak_over_null": 9.0,
         "peak_omega_resolved": True,
+        "t0_resolved": True,
         "bands_calibrated": True,
     },
     "wearable": {

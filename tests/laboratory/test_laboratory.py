@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from replay.laboratory import (
     answer,
     calibrate,
     curve_answer,
+    left_out,
     programme,
     read_tests,
     rms,
@@ -121,6 +123,20 @@ def test_what_no_datum_sees_is_said_to_be_unseen() -> None:
     )
     assert fit.spread[0] < 0.5
     assert fit.spread[1] > 10
+
+
+def test_a_test_left_out_is_foretold_where_the_tests_agree_and_betrayed_where_one_does_not() -> None:
+    free = [Free("shear_modulus_pa", 1e3, 1e5), Free("yield_stress_pa", 1e3, 1e5)]
+    curves = [curve_of(brain(), "simple_shear", rate) for rate in (1.0, 30.0, 90.0)]
+    for curve, error in zip(curves, left_out(brain(), free, curves).values(), strict=True):
+        assert error < 0.02 * curve.stresses_pa.max()
+    odd = dataclasses.replace(curves[1], stresses_pa=1.5 * curves[1].stresses_pa)
+    among = [curves[0], odd, curves[2]]
+    foretold = left_out(brain(), free, among)[odd.name]
+    # the others do not know of the odd one, whose fit to itself bends towards it
+    assert foretold == pytest.approx(np.sqrt(((0.5 * curves[1].stresses_pa) ** 2).mean()), rel=0.05)
+    assert foretold > 1.5 * rms(calibrate(brain(), free, among, starts=1, profiles=0).material, [odd])[odd.name]
+    assert left_out(brain(), free, [odd]) == {}
 
 
 def curve_of(material: Material, mode: str, rate: float) -> Curve:

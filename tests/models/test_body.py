@@ -181,29 +181,52 @@ def test_the_head_and_helmet_are_untouched_by_the_body(helmeted: Model, player: 
     assert player.nodes[n:, 2].max() < 0.02, "the body is below the head"
 
 
-def test_no_hex_is_bad_and_all_hold_together(player: Model) -> None:
-    own = player.hexes[player.elements_of(assembly="body")]
-    assert scaled_jacobians(player.nodes, own).min() >= 0.25
-    assert aspect_ratios(player.nodes, own).max() < 8.0
-    names = {part.name: k for k, part in enumerate(player.parts)}
-    for joint in body_joints():  # flesh crosses every joint
+@pytest.fixture(scope="module")
+def fleshed(helmeted: Model) -> Model:
+    return with_body(helmeted, dataclasses.replace(DEMO, tissue="deformable", step_m=0.030))
+
+
+def nodes_of(model: Model, segment: str) -> np.ndarray:
+    """Rows of the nodes of a segment's bone and flesh."""
+    own = [k for k, p in enumerate(model.parts) if p.assembly == "body" and p.name.partition("_")[2] == segment]
+    return np.unique(model.hexes[np.isin(model.element_part, own)])
+
+
+def test_no_hex_is_bad(player: Model, fleshed: Model) -> None:
+    for model in (player, fleshed):
+        own = model.hexes[model.elements_of(assembly="body")]
+        assert scaled_jacobians(model.nodes, own).min() >= 0.25
+        assert aspect_ratios(model.nodes, own).max() < 8.0
+
+
+def test_flesh_goes_on_over_every_joint_and_rigid_segments_meet_there(player: Model, fleshed: Model) -> None:
+    for joint in body_joints():
         if joint.child in MESHED:
-            nodes = [
-                np.unique(player.hexes[np.isin(player.element_part, [names[f"bone_{s}"], names.get(f"flesh_{s}", -1)])])
-                for s in (joint.parent, joint.child)
-            ]
-            assert len(np.intersect1d(*nodes)) >= 4, joint.name
+            shared = [np.intersect1d(nodes_of(m, joint.parent), nodes_of(m, joint.child)) for m in (player, fleshed)]
+            assert len(shared[0]) == 0, joint.name
+            assert len(shared[1]) >= 4, joint.name
+            parent, child = (player.nodes[nodes_of(player, s)] for s in (joint.parent, joint.child))
+            met = (np.abs(parent[:, None] - child[None]).max(axis=2) < 1e-12).any(axis=1)
+            assert met.sum() >= 4, joint.name
+            # about where they meet they turn
+            centre = next(j.centre_m for j in player.joints if j.name == joint.name)
+            away = np.linalg.norm(parent[met].mean(axis=0) - centre)
+            assert away < 0.09, joint.name
 
 
-def test_no_two_bones_share_a_node(player: Model) -> None:
+def test_no_two_bones_share_a_node(player: Model, fleshed: Model) -> None:
     """Else they were one body, and the joint between them nothing."""
-    bones = [k for k, part in enumerate(player.parts) if part.role == "bone"]
-    assert len(bones) == len(MESHED)
-    count = np.zeros(len(player.nodes), int)
-    for k in bones:
-        count[np.unique(player.hexes[player.element_part == k])] += 1
-    count[player.node_sets["skull_base"]] += 1
-    assert count.max() == 1
+    for model in (player, fleshed):
+        bones = [k for k, part in enumerate(model.parts) if part.role == "bone"]
+        assert len(bones) == len(MESHED)
+        count = np.zeros(len(model.nodes), int)
+        for k in bones:
+            count[np.unique(model.hexes[model.element_part == k])] += 1
+        for name in model.rigid_node_sets:
+            count[model.node_sets[name]] += 1
+        assert count.max() == 1
+    assert fleshed.rigid_node_sets == ("skull_base",)
+    assert player.rigid_node_sets == ()
 
 
 def test_the_same_plan_gives_the_same_bytes(tmp_path: Path, helmeted: Model, player: Model) -> None:
@@ -212,7 +235,7 @@ def test_the_same_plan_gives_the_same_bytes(tmp_path: Path, helmeted: Model, pla
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
     back = read_model(tmp_path / "a.h5")
     assert back.joints == player.joints
-    assert back.rigid_node_sets == ("skull_base",)
+    assert back.rigid_node_sets == player.rigid_node_sets
 
 
 def test_a_body_that_cannot_be_is_refused(helmeted: Model, player: Model) -> None:

@@ -36,6 +36,17 @@ def test_quality_is_above_its_floor_in_every_preset(preset: str, resolution: str
     assert model.info["guard_moved_nodes"] == 0
 
 
+@pytest.mark.slow
+def test_the_fine_mesh_is_as_good_as_the_others() -> None:
+    model = build_model("nfl", "fine")
+    quality = scaled_jacobians(model.nodes, model.hexes)
+    assert quality.min() >= 0.40
+    assert np.percentile(quality, 1) >= 0.65
+    assert quality.mean() >= 0.90
+    assert aspect_ratios(model.nodes, model.hexes).max() <= 9.0
+    assert model.info["guard_moved_nodes"] == 0
+
+
 def test_every_inner_face_is_shared_by_exactly_two_hexes_and_seen_from_both_sides(model: Model) -> None:
     faces = model.hexes[:, FACES].reshape(-1, 4)
     key = np.sort(faces, axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from replay.models import Model, assembly_inspection, assembly_mass, build_model, helmet_inspection, parts_table
+from replay.models.comparison import comparison_text
 from replay.models.cubed_sphere import HEX_CORNERS, cube_lattice
 from replay.models.inspection import helmet_datum, mass_report, missing_interfaces, unconnected_parts
 from replay.models.mass import mass_properties, three_point_datum
@@ -282,3 +283,18 @@ def test_a_bare_head_is_the_head_of_the_helmeted_one(tiny: Model) -> None:
     assert {part.assembly for part in bare.parts} == {"head"}
     with pytest.raises(ValueError, match="no element of the assembly 'helmet'"):
         select_assembly(bare, "helmet")
+
+
+def test_masses_are_told_beside_the_articles_and_an_average_mans() -> None:
+    text = comparison_text(build_model("anat", "tiny"))
+    rows = {line[:32].strip(): line[32:].split() for line in text.splitlines()}
+    assert rows["mass kg"][:2] == ["1.73", "1.82"]  # the last of that name: the helmet
+    brain = build_model("anat", "tiny", helmet=False)
+    litres = hex_volumes(brain.nodes, brain.hexes)[brain.elements_of(role="brain")].sum() * 1e6
+    assert rows["brain"] == [f"{litres:.1f}", "1190.0", f"{litres / 1e3:.3f}", "1.19"]
+    moments = np.diag(assembly_mass(brain, "head").inertia_kg_m2) * 1e3
+    for axis, here, there in zip("xyz", moments, (21.5, 23.3, 15.5)):
+        found = rows[f"I{axis}{axis} 1e-3 kg m2"]
+        assert float(found[0]) == pytest.approx(here, abs=0.006)
+        assert float(found[2]) == pytest.approx(100 * (here / there - 1), abs=0.5)
+    assert "helmet" not in comparison_text(brain)

@@ -1,12 +1,12 @@
-"""The shipped bands cover on motions that had no part in making them, and would not if they were half as wide."""
+"""The shipped bands cover on motions that had no part in making them, and would not if they were a quarter as wide."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from replay.motion.bands import CONSTANTS_FILE, QUANTITIES, RATIOS, band, constants
-from replay.motion.families import BUILDING, TESTING, draw
+from replay.motion.bands import CONSTANTS_FILE, QUANTITIES, band, constants
 from replay.motion.readout import ANGULAR, read_out
+from replay.motion.synthetic.families import BUILDING, TESTING, draw
 
 CLIPS = 30
 SIGMA_RAD = np.array([0.011, 0.025, 0.026])
@@ -31,7 +31,7 @@ def told():
         steps = (len(drawn.time_s) - 1) // (len(time) - 1)
         peaks = np.linalg.norm(drawn.rate, axis=2)[:, steps:-steps].max(axis=1)
         fine = truth.at(np.linspace(time[1], time[-2], 1000))
-        out.append((band("omega_rad_per_s", peaks), float(fine.omega_resultant.max())))
+        out.append((band("omega_rad_per_s", peaks, 59.94), float(fine.omega_resultant.max())))
     return out
 
 
@@ -47,8 +47,8 @@ def test_bands_cover_on_other_families(told):
     assert covered(told, 1.0) >= 0.85
 
 
-def test_bands_of_half_the_width_would_not(told):
-    assert covered(told, 0.5) < 0.85
+def test_bands_of_a_quarter_of_the_width_would_not(told):
+    assert covered(told, 0.25) < 0.85
 
 
 def test_the_peak_is_read_as_well_as_the_table_says(told):
@@ -62,8 +62,42 @@ def test_families_that_build_do_not_test():
 
 
 def test_every_quantity_has_constants():
-    assert set(constants().peaks) == set(QUANTITIES)
-    for name in RATIOS:
-        calibration = constants().peaks[name]
-        assert sorted(calibration.widths) == list(calibration.widths)
-        assert min(calibration.reach) > 0.0
+    known = constants()
+    assert {*known.peaks, "t0_s"} == set(QUANTITIES)
+    assert list(known.rates) == sorted(known.rates)
+    assert 0.0 < known.instant < 1.0
+    for by_rate in known.peaks.values():
+        assert len(by_rate) == len(known.rates)
+        for calibration in by_rate:
+            assert sorted(calibration.widths) == list(calibration.widths)
+            assert min(*calibration.below, *calibration.above) > 0.0
+
+
+def test_constants_between_two_rates_lie_between_theirs():
+    known = constants()
+    at = [known.at_rate(known.curves["omega"], fps) for fps in (30.0, 59.94, 84.8, 119.88)]
+    assert at[0] == at[1] == known.curves["omega"][0]
+    assert at[2] == pytest.approx(0.5 * (at[1] + at[3]), rel=1e-3)
+
+
+def test_lobes_of_like_height_compete_and_a_single_one_does_not():
+    time = np.arange(0.0, 0.2, 0.001)
+
+    def lobe(at):
+        return np.exp(-0.5 * ((time - at) / 0.004) ** 2)
+
+    two = constants().instants(time, lobe(0.080) + 0.95 * lobe(0.120))
+    first, second = (part.chance for part in two.parts)
+    assert 0.5 < first < 0.7
+    assert first + second == pytest.approx(1.0)
+    assert two.value == pytest.approx(0.080)
+    assert two.resolved
+    assert two.covers(0.080)
+    assert two.covers(0.120)
+    assert not two.covers(0.100)
+    assert " or " in two.text(1e-3)
+    one = constants().instants(time, lobe(0.080))
+    assert not one.parts
+    assert one.low < 0.080 < one.high
+    flat = constants().instants(time, np.ones(len(time)))
+    assert not flat.resolved

@@ -71,7 +71,8 @@ def test_both_modes_stand_in_one_table(demo, written):
 
 def test_initial_conditions_of_both_modes_are_written(written):
     table = pd.read_csv(written / "initial_conditions_t0.csv")
-    assert list(table["mode"]) == ["protocol"] * 2 + ["posterior"] * 2
+    assert list(table["mode"]) == ["protocol"] * 2 + ["posterior"] * 3
+    assert list(table["instant"]) == ["t0", "window_start", "t0", "window_start", "onset"]
     row = table[(table["mode"] == "posterior") & (table["instant"] == "t0")].iloc[0]
     assert row["spin_lo_rad_per_s"] <= row["spin_rad_per_s"] <= row["spin_hi_rad_per_s"]
 

@@ -1,10 +1,12 @@
 """The read-out between frames: its own pulses come back, a quiet head stays quiet, and its bands cover."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from replay.motion.bands import RATIOS, Calibration, band, spread
+from replay.motion.bands import RATIOS, Calibration, band, constants, spread
 from replay.motion.events import event_aligned, pulse
 from replay.motion.readout import ANGULAR, fine_grid, read_out
 
@@ -82,15 +84,17 @@ def test_the_read_out_does_not_care_for_the_axes():
 def test_a_band_is_the_centre_shifted_and_widened():
     found = spread("omega_rad_per_s", np.exp(np.random.default_rng(0).normal(np.log(30.0), 0.1, 4000)))
     assert found.width == pytest.approx(0.1, rel=0.05)
-    told = Calibration((0.05, 0.2), (0.0, 1.0), (2.0, 4.0)).apply("omega_rad_per_s", found)
+    made = Calibration((0.05, 0.2), (0.0, 1.0), (2.0, 4.0), (3.0, 6.0))
+    known = replace(constants(), rates=(60.0,), peaks={"omega_rad_per_s": (made,)})
+    told = known.apply("omega_rad_per_s", found, 100.0)
     assert np.log(told.value / 30.0) == pytest.approx(0.05, abs=0.01)
     # the middle of the knots, in the logarithm of the width
     assert np.log(told.value / told.low) == pytest.approx(0.3, rel=0.06)
-    assert np.log(told.high / told.value) == pytest.approx(0.3, rel=0.06)
+    assert np.log(told.high / told.value) == pytest.approx(0.45, rel=0.06)
 
 
 def test_a_band_that_spans_too_much_is_said_in_words():
-    wide = band("a_along_m_per_s2", np.exp(np.random.default_rng(0).normal(5.0, 1.5, 500)))
+    wide = band("a_along_m_per_s2", np.exp(np.random.default_rng(0).normal(5.0, 1.5, 500)), 59.94)
     assert not wide.resolved
     assert wide.text() == "not resolvable from this footage"
     assert set(RATIOS) >= {"omega_rad_per_s", "alpha_rad_per_s2"}

@@ -139,7 +139,7 @@ def test_files_have_their_fixed_columns_and_the_summary_is_one_page(demo, tmp_pa
 def test_initial_conditions_carry_the_axis_of_rotation(demo, tmp_path):
     demo.write(tmp_path)
     table = INITIAL_CONDITIONS.read(tmp_path / "initial_conditions_t0.csv")
-    assert table["instant"].tolist() == ["t0", "window_start"] * 2
+    assert table["instant"].tolist() == ["t0", "window_start", "t0", "window_start", "onset"]
     p = table[["px_m", "py_m", "pz_m"]].to_numpy()
     q = table[["qx_axis_m", "qy_axis_m", "qz_axis_m"]].to_numpy()
     omega = table[[f"omega_{c}_rad_per_s" for c in "xyz"]].to_numpy()

@@ -152,13 +152,13 @@ def peaks() -> pd.DataFrame:
     unresolved = "not resolvable from this footage"
     return pd.DataFrame(
         {
-            "quantity": ["omega_rad_per_s", "a_along_m_per_s2", "t0_s"],
-            "protocol": [29.0, 310.0, 0.1001],
-            "protocol_null": [0.7, 290.0, np.nan],
-            "posterior": [30.5, np.nan, 0.0984],
-            "posterior_lo": [28.4, np.nan, 0.0971],
-            "posterior_hi": [32.5, np.nan, 0.0995],
-            "resolved": ["yes", unresolved, "yes"],
+            "quantity": ["omega_rad_per_s", "a_along_m_per_s2", "t0_s", "onset_s"],
+            "protocol": [29.0, 310.0, 0.1001, np.nan],
+            "protocol_null": [0.7, 290.0, np.nan, np.nan],
+            "posterior": [30.5, np.nan, 0.0984, 0.0912],
+            "posterior_lo": [28.4, np.nan, 0.0971, 0.0897],
+            "posterior_hi": [32.5, np.nan, 0.1295, 0.0931],
+            "resolved": ["yes", unresolved, "2 instants compete", "yes"],
         }
     )
 

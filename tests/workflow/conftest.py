@@ -63,7 +63,9 @@ class Checkout:
     def replay(self, play: str, *, cores: int = 2, resolution: str = "tiny", config: tuple[str, ...] = ()) -> str:
         """Run the whole workflow for one play."""
         target = f"results/{play}/bundle/{play}.zip"
-        return self.run("snakemake", "--cores", str(cores), target, "--config", f"resolution={resolution}", *config)
+        threads = [f"{rule}={cores}" for rule in ("shake", "impact", "sensitivity")]
+        call = ("snakemake", "--cores", str(cores), target, "--set-threads", *threads, "--config")
+        return self.run(*call, f"resolution={resolution}", *config)
 
     def planned(self, play: str) -> list[str]:
         """Rules that the workflow would run now."""

@@ -4,16 +4,18 @@
 rule assemble:
     input:
         settings=stage("settings"),
-        inputs=stage("inputs"),
-        code=code("stages/assemble.py", "stages/frame.py", "models", "gates"),
+        inputs=of("inputs"),
+        code=code("assemble"),
     output:
         stage("assembly"),
     log:
         log("assemble"),
     benchmark:
-        "results/{play}/logs/assemble.benchmark.tsv"
+        cost("assemble")
+    group:
+        "prepare"
     resources:
-        mem_mb=2000,
+        mem_mb=memory,
         runtime=20,
     message:
         "{wildcards.play}: build the head and helmet, check the helmet and the assembly"
@@ -24,22 +26,15 @@ rule assemble:
 rule place:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
-        driver=stage("driver"),
-        code=code(
-            "stages/placement.py",
-            "stages/players.py",
-            "stages/collision.py",
-            "stages/problem.py",
-            "stages/frame.py",
-            "models",
-            "solver/contact",
-            "gates",
-        ),
+        assembly=of("assembly"),
+        driver=of("driver"),
+        code=code("placement"),
     output:
         stage("placement"),
     log:
         log("place"),
+    group:
+        "prepare"
     resources:
         mem_mb=2000,
         runtime=20,
@@ -52,42 +47,45 @@ rule place:
 rule shake:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
-        code=code(
-            "stages/shake.py",
-            "stages/frame.py",
-            "stages/problem.py",
-            "models",
-            "solver",
-            "gates",
-        ),
+        assembly=of("assembly"),
+        code=code("shake"),
     output:
         stage("shake"),
     log:
         log("shake"),
     benchmark:
-        "results/{play}/logs/shake.benchmark.tsv"
-    threads: workflow.cores
+        cost("shake")
+    # killed or out of time, it goes on from its checkpoint
+    retries: 3
+    threads: solver_threads
     resources:
-        mem_mb=4000,
+        checkpoint_s=CHECKPOINT_S,
+        mem_mb=memory,
         runtime=60,
     message:
         "{wildcards.play}: shake the helmet alone"
     shell:
-        "replay shake {wildcards.play} --threads {threads} --carry-on 2>&1 | tee {log}"
+        "replay shake {wildcards.play} --threads {threads} --checkpoint-every {resources.checkpoint_s} --carry-on 2>&1 | tee {log}"
 
 
 rule decks:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
-        driver=stage("driver"),
+        assembly=of("assembly"),
+        driver=of("driver"),
         placement=placement,
-        code=code("stages/decks.py", "stages/frame.py", "decks", "models"),
+        code=code("decks"),
     output:
         stage("decks"),
     log:
         log("decks"),
+    benchmark:
+        cost("decks")
+    group:
+        "prepare"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     message:
         "{wildcards.play}: write the run decks for other solvers"
     shell:

@@ -1,14 +1,45 @@
 # The play, its raw tracks, and the motion they show.
 
 
+rule write_out:
+    input:
+        tracks=play_files,
+        code=code("write_out"),
+    output:
+        f"{WRITTEN_OUT}/{{play}}/play.yaml",
+    log:
+        "results/{play}/logs/write_out.log",
+    wildcard_constraints:
+        play=PLAY,
+    params:
+        table=TABLE,
+        plays=PLAYS,
+        row=row_of,
+        into=lambda wildcards, output: Path(output[0]).parents[1].as_posix(),
+    message:
+        "{wildcards.play}: write its row of the table as a play of its own"
+    shell:
+        "replay write-out {wildcards.play} --table {params.table} --plays {params.plays} --into {params.into}"
+        " 2>&1 | tee {log}"
+
+
 rule settings:
     input:
-        play=f"{PLAYS}/{{play}}/play.yaml",
-        code=code("stages/settings.py", "stages/frame.py", "gates", "models"),
+        play=description,
+        code=code("settings"),
     output:
         stage("settings"),
     log:
         log("settings"),
+    benchmark:
+        cost("settings")
+    wildcard_constraints:
+        play=PLAY,
+    group:
+        "prepare"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     params:
         plays=folder_of_plays,
         resolution=config.get("resolution") or "as-the-play-says",
@@ -21,13 +52,20 @@ rule settings:
 rule inputs:
     input:
         settings=stage("settings"),
-        play=f"{PLAYS}/{{play}}/play.yaml",
+        play=description,
         tracks=play_files,
-        code=code("stages/inputs.py", "stages/frame.py", "motion"),
+        code=code("inputs"),
     output:
         stage("inputs"),
     log:
         log("inputs"),
+    benchmark:
+        cost("inputs")
+    group:
+        "prepare"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     params:
         plays=folder_of_plays,
     message:
@@ -39,16 +77,18 @@ rule inputs:
 rule reconstruct:
     input:
         settings=stage("settings"),
-        inputs=stage("inputs"),
-        code=code("stages/reconstruct.py", "stages/frame.py", "motion", "gates"),
+        inputs=of("inputs"),
+        code=code("reconstruct"),
     output:
         stage("reconstruction"),
     log:
         log("reconstruct"),
     benchmark:
-        "results/{play}/logs/reconstruct.benchmark.tsv"
+        cost("reconstruct")
+    group:
+        "prepare"
     resources:
-        mem_mb=1000,
+        mem_mb=memory,
         runtime=20,
     message:
         "{wildcards.play}: reconstruct the six degrees of freedom of the skull CG"
@@ -59,12 +99,19 @@ rule reconstruct:
 rule drive:
     input:
         settings=stage("settings"),
-        reconstruction=stage("reconstruction"),
-        code=code("stages/drive.py", "stages/frame.py", "motion"),
+        reconstruction=of("reconstruction"),
+        code=code("drive"),
     output:
         stage("driver"),
     log:
         log("drive"),
+    benchmark:
+        cost("drive")
+    group:
+        "prepare"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     message:
         "{wildcards.play}: resample the motion for the solver"
     shell:

@@ -4,83 +4,76 @@
 rule impact:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
-        driver=stage("driver"),
+        assembly=of("assembly"),
+        driver=of("driver"),
         placement=placement,
-        shake=stage("shake"),
-        code=code(
-            "stages/impact.py",
-            "stages/frame.py",
-            "stages/problem.py",
-            "stages/players.py",
-            "stages/collision.py",
-            "models",
-            "solver",
-            "measures",
-            "gates",
-        ),
+        shake=of("shake"),
+        code=code("impact"),
     output:
         stage("replay"),
     log:
         log("impact"),
     benchmark:
-        "results/{play}/logs/impact.benchmark.tsv"
-    threads: workflow.cores
+        cost("impact")
+    # killed or out of time, it goes on from its checkpoint
+    retries: 3
+    threads: solver_threads
     resources:
-        mem_mb=8000,
-        runtime=1440,
+        checkpoint_s=CHECKPOINT_S,
+        mem_mb=memory,
+        runtime=minutes,
     message:
         "{wildcards.play}: replay the impact"
     shell:
-        "replay impact {wildcards.play} --threads {threads} --carry-on 2>&1 | tee {log}"
+        "replay impact {wildcards.play} --threads {threads} --checkpoint-every {resources.checkpoint_s} --carry-on 2>&1 | tee {log}"
 
 
 rule sensitivity:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
-        driver=stage("driver"),
+        assembly=of("assembly"),
+        driver=of("driver"),
         placement=placement,
-        shake=stage("shake"),
+        shake=of("shake"),
         replay=stage("replay"),
-        code=code(
-            "stages/sensitivity.py",
-            "stages/frame.py",
-            "stages/problem.py",
-            "stages/players.py",
-            "stages/collision.py",
-            "models",
-            "solver",
-            "measures",
-            "gates",
-        ),
+        code=code("sensitivity"),
     output:
         stage("sensitivity"),
     log:
         log("sensitivity"),
     benchmark:
-        "results/{play}/logs/sensitivity.benchmark.tsv"
-    threads: workflow.cores
+        cost("sensitivity")
+    # killed or out of time, it goes on from its checkpoint
+    retries: 3
+    threads: solver_threads
     resources:
-        mem_mb=8000,
-        runtime=1440,
+        checkpoint_s=CHECKPOINT_S,
+        mem_mb=memory,
+        runtime=minutes,
     message:
         "{wildcards.play}: the same replay at half the hourglass coefficient"
     shell:
-        "replay sensitivity {wildcards.play} --threads {threads} --carry-on 2>&1 | tee {log}"
+        "replay sensitivity {wildcards.play} --threads {threads} --checkpoint-every {resources.checkpoint_s} --carry-on 2>&1 | tee {log}"
 
 
 rule fidelity:
     input:
         settings=stage("settings"),
-        driver=stage("driver"),
+        driver=of("driver"),
         placement=placement,
         replay=stage("replay"),
-        code=code("stages/fidelity.py", "stages/frame.py", "measures", "gates"),
+        code=code("fidelity"),
     output:
         stage("fidelity"),
     log:
         log("fidelity"),
+    benchmark:
+        cost("fidelity")
+    group:
+        "finish"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     message:
         "{wildcards.play}: compare the applied motion with the target"
     shell:
@@ -90,17 +83,21 @@ rule fidelity:
 rule measure:
     input:
         settings=stage("settings"),
-        assembly=stage("assembly"),
+        assembly=of("assembly"),
         placement=placement,
         replay=stage("replay"),
-        sensitivity=stage("sensitivity"),
-        code=code("stages/measure.py", "stages/frame.py", "measures", "models"),
+        sensitivity=of("sensitivity"),
+        code=code("measure"),
     output:
         stage("measures"),
     log:
         log("measure"),
+    benchmark:
+        cost("measure")
+    group:
+        "finish"
     resources:
-        mem_mb=2000,
+        mem_mb=memory,
         runtime=20,
     message:
         "{wildcards.play}: measure the head, the brain and the mechanical action"

@@ -4,11 +4,18 @@
 rule verdict:
     input:
         stages=evidence(),
-        code=code("stages/verdict.py", "stages/frame.py", "gates", "bundle"),
+        code=code("verdict"),
     output:
         stage("verdict"),
     log:
         log("verdict"),
+    benchmark:
+        cost("verdict")
+    group:
+        "finish"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     message:
         "{wildcards.play}: collect the gates into one verdict"
     shell:
@@ -18,7 +25,7 @@ rule verdict:
 rule report:
     input:
         stages=evidence("verdict"),
-        code=code("stages/report.py", "stages/frame.py", "report"),
+        code=code("report"),
     output:
         manifest=stage("report"),
         page=report(
@@ -29,8 +36,12 @@ rule report:
         ),
     log:
         log("report"),
+    benchmark:
+        cost("report")
+    group:
+        "finish"
     resources:
-        mem_mb=2000,
+        mem_mb=memory,
         runtime=20,
     message:
         "{wildcards.play}: write the report"
@@ -40,15 +51,22 @@ rule report:
 
 rule seal:
     input:
-        play=f"{PLAYS}/{{play}}/play.yaml",
+        play=description,
         stages=evidence("verdict", "report"),
         lock="environment.lock",
-        code=code("stages/seal.py", "stages/frame.py", "bundle"),
+        code=code("seal"),
     output:
         bundle="results/{play}/bundle/{play}.zip",
         digest="results/{play}/bundle/{play}.zip.sha256",
     log:
         log("seal"),
+    benchmark:
+        cost("seal")
+    group:
+        "finish"
+    resources:
+        mem_mb=memory,
+        runtime=10,
     params:
         plays=folder_of_plays,
     message:

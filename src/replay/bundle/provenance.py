@@ -55,11 +55,14 @@ def read_jobs(records: str | Path | None, play: str) -> dict[str, Job]:
             # Long names are cut into folders, each but the last with a leading @.
             encoded = "".join(part.removeprefix("@") for part in path.relative_to(records).parts)
             target = base64.urlsafe_b64decode(encoded).decode()
-            record = json.loads(path.read_text(encoding="utf-8"))
             parts = Path(target).parts
             at = parts.index(play)
             stage = parts[at + 1]
-            if at == 0 or len(parts) < at + 3 or stage == "bundle" or record.get("incomplete"):
+            if at == 0 or len(parts) < at + 3 or stage == "bundle":
+                continue
+            # only now: in a season most records are of other plays
+            record = json.loads(path.read_text(encoding="utf-8"))
+            if record.get("incomplete"):
                 continue
             job = Job(
                 record["rule"], _plain(record["shellcmd"] or ""), _iso(record["starttime"]), _iso(record["endtime"])

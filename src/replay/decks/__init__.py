@@ -16,6 +16,7 @@ from replay.decks.deck import (
 )
 from replay.decks.keyword import KeywordDeck, read_keyword
 from replay.decks.lsdyna import write_lsdyna, write_openradioss
+from replay.decks.slurm import write_own_submit
 from replay.decks.velodyne import read_velodyne, write_velodyne
 
 __all__ = [
@@ -36,5 +37,6 @@ __all__ = [
     "read_velodyne",
     "write_lsdyna",
     "write_openradioss",
+    "write_own_submit",
     "write_velodyne",
 ]

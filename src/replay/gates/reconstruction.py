@@ -29,6 +29,7 @@ VIDEO_CHECKS = (
     "posterior_flip_margin",
     "posterior_peak_over_null",
     "peak_omega_resolved",
+    "t0_resolved",
     "bands_calibrated",
 )
 WEARABLE_CHECKS = (
@@ -73,6 +74,7 @@ def video_reconstruction_gate(quality: Mapping[str, Any], limits: Limits) -> Gat
         - ``posterior_flip_margin``: log odds of the whole path against its mirrored twin.
         - ``posterior_peak_over_null``: posterior mode's peak angular velocity over the one that noise alone shows.
         - ``peak_omega_resolved``: whether its band is narrow enough to be a measurement.
+        - ``t0_resolved``: whether the instant of peak angular acceleration is one, known to 40 ms.
         - ``bands_calibrated``: whether the bands were made to cover on footage like this (band coverage class).
     """
     values = dict(quality)

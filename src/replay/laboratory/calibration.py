@@ -194,6 +194,23 @@ def calibrate(
     )  # fmt: skip
 
 
+def left_out(material: Material, free: Sequence[Free], curves: Sequence[Curve]) -> dict[str, float]:
+    """Root mean square error of every curve under the fit to all others [Pa]: what a fit foretells.
+
+    Parameters
+    ----------
+    material
+        First guess of each of the fits; that of all curves is a fair one.
+    free, curves
+        As of `calibrate`. Of one curve nothing can be left out: the result is empty.
+    """
+    errors: dict[str, float] = {}
+    for curve in curves if len(curves) > 1 else ():
+        others = [other for other in curves if other is not curve]
+        errors |= rms(calibrate(material, free, others, starts=1, profiles=0).material, [curve])
+    return errors
+
+
 def _with(material: Material, free: Sequence[Free], x: NDArray[np.float64]) -> Material:
     values: Mapping[str, Any] = dict(zip((f.name for f in free), np.exp(x).tolist()))
     return replace(material, parameters={**material.parameters, **values})

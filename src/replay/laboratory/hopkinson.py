@@ -116,7 +116,7 @@ def quarter_cylinder(specimen: Specimen) -> tuple[NDArray[np.float64], NDArray[n
 def platens(specimen: Specimen) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Two plates of one hexahedron, below and above the specimen; the lower one comes first.
 
-    Their corners lie where the specimen does not come: a node of a plate that its rim passes would hold the rim.
+    Their corners lie where the specimen does not come.
     """
     width, thickness, start = 2.5 * specimen.radius_m, 0.2 * specimen.radius_m, -0.5 * specimen.radius_m
     sheets = [

@@ -7,11 +7,13 @@ from pathlib import Path
 from replay.models.body.player import BodyPlan, with_body
 from replay.models.body.posture import Posture, posture_names
 from replay.models.build import build_model
+from replay.models.comparison import comparison_text
 from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
+from replay.models.membranes import CableNet, falx, tentorium
 from replay.models.model import Model, ModelJoint, Part, read_model, write_model
-from replay.models.parts_table import PARTS, parts_table, summary_text, write_parts_table
+from replay.models.parts_table import PARTS, parts_table, segments_text, summary_text, write_parts_table
 from replay.models.players import placed, second_player, together
 from replay.models.submodel import select_assembly
 
@@ -26,6 +28,7 @@ def write_preview(path: str | Path, model: Model) -> None:
 __all__ = [
     "PARTS",
     "BodyPlan",
+    "CableNet",
     "HelmetDesign",
     "Model",
     "ModelJoint",
@@ -37,6 +40,8 @@ __all__ = [
     "brain_parameters",
     "brain_sets",
     "build_model",
+    "comparison_text",
+    "falx",
     "helmet_inspection",
     "load_design",
     "load_materials",
@@ -46,8 +51,10 @@ __all__ = [
     "posture_names",
     "read_model",
     "second_player",
+    "segments_text",
     "select_assembly",
     "summary_text",
+    "tentorium",
     "together",
     "with_body",
     "write_model",

@@ -12,7 +12,7 @@ from replay.models.calibration import calibrate_densities
 from replay.models.cubed_sphere import cube_lattice
 from replay.models.facemask import facemask_mesh
 from replay.models.guard import relocate_worst_nodes
-from replay.models.head_shape import HeadPreset, head_preset
+from replay.models.head_shape import HeadPreset, head_preset, load_data
 from replay.models.helmet import helmet_mesh
 from replay.models.helmet_design import HelmetDesign, load_design
 from replay.models.helmet_layout import direction_at, helmet_layout
@@ -28,8 +28,15 @@ NOTES = (
     "facemask bars share nodes at crossings, their mounts with the edge of the shell; one hex across a bar",
     "brain and scalp are an average of many people's anatomy; the skull between them is a rule, not a measured bone",
     "sulci and ventricles are meshed as grey matter: the fluid of the article is stiffer in shear than brain",
-    "falx and tentorium are left out",
 )
+OUTLET_NOTES = {
+    "closed": "the skull is closed below the brainstem",
+    "open": "fluid fills the foramen magnum; below it is the flesh of the neck, no spinal canal",
+}
+MEMBRANE_NOTES = {
+    "none": "falx and tentorium are left out",
+    "cables": "falx and tentorium are nets of cables in the replay; decks do not hold them",
+}
 SEAT_NOTES = {
     "shared_nodes": (
         "contact is not modelled: pads share nodes with scalp, with each other and with the shell; chin cup with scalp",
@@ -62,9 +69,10 @@ def build_model(
     *,
     helmet: bool = True,
     design: HelmetDesign | None = None,
-    player: int = 1,
     helmet_structure: str = "rigid",
     brain: str = "brain_isv",
+    membranes: str = "none",
+    outlet: str = "closed",
     seat: str = "shared_nodes",
 ) -> Model:
     """Build head and helmet.
@@ -81,12 +89,14 @@ def build_model(
         False for a bare head.
     design
         The helmet of `load_design`; the classic one where None.
-    player
-        1 or 2: whose blocks of numbers head and helmet take.
     helmet_structure
         ``rigid``: shell and facemask move as one body; ``deformable``: both are elastic.
     brain
         Law of the brain: ``brain_isv`` or ``viscohyperelastic``.
+    membranes
+        Falx and tentorium: ``none``, or ``cables`` (see `replay.models.membranes`).
+    outlet
+        Skull below the brainstem: ``closed``, or ``open`` with fluid in the foramen magnum.
     seat
         ``shared_nodes``: pads and chin cup share the scalp's nodes; ``contact``: they touch it, held by chin straps.
 
@@ -98,10 +108,16 @@ def build_model(
     Raises
     ------
     ValueError
-        For an unknown preset, resolution, structure, seat or player, or a mass that is not positive.
+        For an unknown preset, resolution, structure, membranes, outlet or seat, or a mass that is not positive.
     """
     if helmet_structure not in STRUCTURE_NOTES:
         message = f"no helmet structure {helmet_structure!r}; there are {', '.join(STRUCTURE_NOTES)}"
+        raise ValueError(message)
+    if membranes not in MEMBRANE_NOTES:
+        message = f"no membranes {membranes!r}; there are {', '.join(MEMBRANE_NOTES)}"
+        raise ValueError(message)
+    if outlet not in OUTLET_NOTES:
+        message = f"no outlet {outlet!r}; there are {', '.join(OUTLET_NOTES)}"
         raise ValueError(message)
     if seat not in SEAT_NOTES:
         message = f"no helmet seat {seat!r}; there are {', '.join(SEAT_NOTES)}"
@@ -109,16 +125,13 @@ def build_model(
     if resolution not in RESOLUTIONS:
         message = f"no resolution {resolution!r}; there are {', '.join(RESOLUTIONS)}"
         raise ValueError(message)
-    if player not in PLAYERS:
-        message = f"no player {player!r}; there are {', '.join(map(str, PLAYERS))}"
-        raise ValueError(message)
     worn = (design or load_design()) if helmet else None
-    head, blocks = head_preset(preset, RESOLUTIONS[resolution].divisions), PLAYERS[player]
+    head, blocks = head_preset(preset, RESOLUTIONS[resolution].divisions), PLAYERS[1]
     target = worn.mass_kg * head.helmet_size if worn and helmet_mass_kg is None else helmet_mass_kg
     if target is not None and not target > 0:
         message = f"a helmet of {target} kg"
         raise ValueError(message)
-    mesh = _mesh(head, resolution, worn, seat)
+    mesh = _mesh(head, resolution, worn, seat, open_outlet=outlet == "open")
     nodes, moved = relocate_worst_nodes(mesh.nodes, mesh.hexes, target=_QUALITY_TARGET)
     nodes, names = np.round(nodes, GRID_DECIMALS), mesh.part
     parts = tuple(part for part in part_table(blocks, worn) if part.name in set(names.tolist()))
@@ -159,7 +172,7 @@ def build_model(
             "preset": preset,
             "preset_title": head.title,
             "resolution": resolution,
-            "player": player,
+            "player": 1,
             "star_centre_m": [float(v) for v in -cg],
             "tragion_m": [float(v) for v in np.array(head.surfaces.tragion_m) - cg],
             "atlas_centre_mm": list(head.surfaces.atlas_centre_mm),
@@ -171,7 +184,15 @@ def build_model(
             "empty_regions": [n for k, n in enumerate(REGION_NAMES) if k and not (regions == k).any()],
             "helmet_structure": helmet_structure if helmet else None,
             "helmet_seat": seat if helmet else None,
-            "notes": [*SEAT_NOTES[seat], *NOTES, STRUCTURE_NOTES[helmet_structure]] if helmet else list(NOTES),
+            "membranes": membranes,
+            "outlet": outlet,
+            "notes": [
+                *(SEAT_NOTES[seat] if worn else ()),
+                *NOTES,
+                MEMBRANE_NOTES[membranes],
+                OUTLET_NOTES[outlet],
+                *((STRUCTURE_NOTES[helmet_structure],) if worn else ()),
+            ],
             **_record(worn, seat),
         },
     )
@@ -189,12 +210,14 @@ class _Mesh:
     edge: np.ndarray
 
 
-def _mesh(head: HeadPreset, resolution: str, design: HelmetDesign | None, seat: str) -> _Mesh:
+def _mesh(head: HeadPreset, resolution: str, design: HelmetDesign | None, seat: str, *, open_outlet: bool) -> _Mesh:
     setting = RESOLUTIONS[resolution]
     lattice = cube_lattice(setting.divisions)
     layout = helmet_layout(lattice, design or load_design())  # a bare head is that of the classic helmet
     inner = head_mesh(lattice, head.surfaces, setting, layout.directions, head.least_thickness_m)
     names, none = head_part_names(inner, head), np.zeros(0, dtype=int)
+    if open_outlet:
+        names[(names == "skull") & _in_foramen(inner, head)] = "csf"
     if design is None:
         return _Mesh(inner.nodes, inner.hexes, names, {}, none, none)
     outer = helmet_mesh(lattice, layout, inner, head.surfaces.scalp, setting, design, seat)
@@ -208,6 +231,16 @@ def _mesh(head: HeadPreset, resolution: str, design: HelmetDesign | None, seat: 
     )
     names = np.concatenate([names, np.full(len(mask.hexes), "facemask")])
     return _Mesh(mask.nodes, np.vstack([hexes, mask.hexes]), names, mask.mounts, cup, edge)
+
+
+def _in_foramen(mesh: HeadMesh, head: HeadPreset) -> np.ndarray:
+    """Mask (m,) of the hexes of a head whose centre lies in the direction of the foramen magnum."""
+    facts = load_data("heads.yaml")["foramen_magnum"]
+    away = head.surfaces.to_atlas(mesh.nodes[mesh.hexes].mean(axis=1)) - np.array(head.surfaces.atlas_centre_mm)
+    axis = np.array(facts["towards_mni_mm"]) - np.array(head.surfaces.atlas_centre_mm)
+    along = np.einsum("ij,j->i", away, axis) / np.sqrt(axis @ axis)
+    across = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - along**2, 0.0))
+    return (along > 0) & (across < along * np.tan(np.radians(facts["half_angle_deg"])))
 
 
 def head_part_names(mesh: HeadMesh, head: HeadPreset) -> np.ndarray:

@@ -67,9 +67,9 @@ def helmet_datum(model: Model) -> Datum:
 
 
 def mass_report(model: Model) -> dict[str, Any]:
-    """Mass, centre of gravity and inertia of head, helmet and parts; the helmet's CG in its datum (step 1.3)."""
+    """Mass, centre of gravity and inertia of head, helmet, body and parts; the helmet's CG in its datum (step 1.3)."""
     report: dict[str, Any] = {"units": "kg, m, kg m^2; head frame", "assemblies": {}, "parts": {}}
-    for assembly in ("head", "helmet"):
+    for assembly in ("head", "helmet", "body"):
         if model.elements_of(assembly=assembly).any():
             report["assemblies"][assembly] = _as_dict(assembly_mass(model, assembly))
     for part in model.parts:
@@ -209,7 +209,7 @@ def parts_outside_block(model: Model) -> list[str]:
 
 
 def unconnected_parts(model: Model) -> list[str]:
-    """Names of the parts that share no node with another part, and that no strap holds."""
+    """Names of the parts that share no node with another part, and that no strap and no joint holds."""
     pairs = np.unique(np.stack([np.repeat(model.element_part, 8), model.hexes.ravel()], axis=1), axis=0)
     users = np.bincount(pairs[:, 1], minlength=len(model.nodes))
     tied = np.unique(pairs[users[pairs[:, 1]] > 1, 0])
@@ -217,7 +217,8 @@ def unconnected_parts(model: Model) -> list[str]:
     if model.info.get("helmet_seat") == "contact":
         ends += [rows for name, rows in model.node_sets.items() if name.startswith("chin_cup_strap")]
     held = pairs[np.isin(pairs[:, 1], np.concatenate(ends)), 0]
-    return [part.name for k, part in enumerate(model.parts) if k not in tied and k not in held]
+    jointed = {pid for joint in model.joints for pid in (joint.first, joint.second)}
+    return [p.name for k, p in enumerate(model.parts) if k not in tied and k not in held and p.pid not in jointed]
 
 
 def _cg_offset(model: Model, measured_in_datum_m: np.ndarray | None) -> float | str:

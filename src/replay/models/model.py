@@ -168,6 +168,11 @@ class Model:
     joints: tuple[ModelJoint, ...] = ()
     rigid_node_sets: tuple[str, ...] = ()
 
+    @property
+    def has_damage(self) -> bool:
+        """Whether the brain's law keeps the damage variable."""
+        return bool(self.materials["brain"]["law"] == "brain_isv")
+
     def part_index(self, name: str) -> int:
         """Index of the part of this name.
 

@@ -18,7 +18,7 @@ _HEAD_ROLES = {"grey_matter": "brain", "white_matter": "brain"}
 
 @dataclass(frozen=True)
 class Blocks:
-    """Where a player's numbers begin.
+    """Where a player's numbers begin; a body counts on in the block of its head.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Blocks:
     helmet: int
 
     def of(self, assembly: str) -> tuple[int, int]:
-        """First and last number of the block of ``head``, ``helmet`` or ``body``, which shares the head's."""
+        """First and last number of the block of ``head``, ``body`` or ``helmet``."""
         first = self.helmet if assembly == "helmet" else self.head
         return first, first + BLOCK_SIZE - 1
 

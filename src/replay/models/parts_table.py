@@ -23,8 +23,8 @@ PARTS = TableFormat(
     (
         Column("pid", "part number", "int"),
         Column("name", "name of the part", "text"),
-        Column("role", "brain, csf, skull, scalp, comfort_pad, energy_pad, shell, facemask or chin_cup", "text"),
-        Column("assembly", "head or helmet", "text"),
+        Column("role", "what it is: brain, csf, skull, ..., shell, facemask, chin_cup, bone, flesh", "text"),
+        Column("assembly", "head, helmet or body", "text"),
         Column("material", "name of the material", "text"),
         Column("law", "material law", "text"),
         Column("elements", "hexahedra", "int"),
@@ -105,7 +105,36 @@ def summary_text(model: Model) -> str:
             f"{table['volume_m3'][k] * 1e6:>10.2f} {table['mass_kg'][k]:>8.4f} "
             f"{table['min_scaled_jacobian'][k]:>7.3f} {'rigid' if np.isnan(step) else f'{step * 1e6:.3f}':>7}"
         )
-    for assembly in ("head", "helmet"):
+    for assembly in ("head", "helmet", "body"):
         total = sum(m for m, a in zip(table["mass_kg"], table["assembly"]) if a == assembly)
-        lines.append(f"{'':>9} {assembly:24} {'':17} {'':>6} {'':>10} {total:>8.4f}")
+        if assembly in table["assembly"]:
+            lines.append(f"{'':>9} {assembly:24} {'':17} {'':>6} {'':>10} {total:>8.4f}")
     return "\n".join(lines)
+
+
+def segments_text(model: Model) -> str:
+    """Segments of the body as a table for the terminal: what each weighs and what de Leva says."""
+    body, head = model.info["body"], float(_mass_of(model, "head"))
+    title = (
+        f"body {body['stature_m']:g} m, {body['mass_kg']:g} kg, {body['posture']}, {body['tissue']} segments, "
+        f"voxels of {1e3 * body['step_m']:g} mm, SJ {body['min_scaled_jacobian']:.3f} least"
+    )
+    lines = [
+        title,
+        f"{'segment':18} {'hexes':>6} {'bone':>6} {'volume L':>9} {'kg/m3':>7} {'mass kg':>8} {'de Leva':>8} {'%':>7}",
+    ]
+    for name, facts in body["segments"].items():
+        own, wanted = facts["mass_kg"], facts["de_leva_kg"]
+        if name == "neck":  # de Leva has head and neck in one
+            name, own, wanted = "neck and head", own + head, wanted + head
+        lines.append(
+            f"{name:18} {facts['hexes']:>6} {facts['bone_hexes']:>6} {1e3 * facts['volume_m3']:>9.2f} "
+            f"{facts['density_kg_per_m3']:>7.0f} {own:>8.3f} {wanted:>8.3f} {100 * (own / wanted - 1):>+7.2f}"
+        )
+    lines.append(f"{'whole':18} {'':>6} {'':>6} {'':>9} {'':>7} {head + _mass_of(model, 'body'):>8.3f}")
+    return "\n".join(lines)
+
+
+def _mass_of(model: Model, assembly: str) -> float:
+    own = model.elements_of(assembly=assembly)
+    return float((hex_volumes(model.nodes, model.hexes[own]) * model.element_densities()[own]).sum())

@@ -14,10 +14,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from replay.models.model import Model
+from replay.models.numbering import BLOCK_SIZE, PLAYERS
 
-#: Millions of player 1 to those of player 2.
-BLOCKS_OF_SECOND = {10: 20, 60: 40}
-_MILLION = 1_000_000
 _ALL = "all_parts"
 
 
@@ -74,14 +72,13 @@ def second_number(number: int) -> int:
 
 
 def _second(numbers: np.ndarray) -> np.ndarray:
-    # a block is ten millions long
-    block = numbers // (10 * _MILLION) * 10
-    known = np.array(sorted(BLOCKS_OF_SECOND))
-    if not np.isin(block, known).all():
-        message = f"number {numbers[~np.isin(block, known)][0]} lies in no block of player 1"
+    one, two = PLAYERS[1], PLAYERS[2]
+    block = numbers // BLOCK_SIZE * BLOCK_SIZE
+    known = np.isin(block, (one.head, one.helmet))
+    if not known.all():
+        message = f"number {numbers[~known][0]} lies in no block of player 1"
         raise ValueError(message)
-    shift = np.array([BLOCKS_OF_SECOND[k] - k for k in known.tolist()])[np.searchsorted(known, block)]
-    return numbers + shift * _MILLION
+    return numbers + np.where(block == one.head, two.head - one.head, two.helmet - one.helmet)
 
 
 def second_set_name(name: str) -> str:

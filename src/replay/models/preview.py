@@ -29,8 +29,8 @@ _COLOURS = {
     "shell": "#2f4b7c",
     "facemask": "#8d99ae",
     "chin_cup": "#e07a3f",
-    "bone": "#efe6cf",
-    "flesh": "#c98f6b",
+    "bone": "#e9dcc0",
+    "flesh": "#c98f78",
 }
 _LIGHT = np.array([-0.35, 0.45, 0.82])
 
@@ -60,12 +60,16 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
         _paint(axes, model, shown, azimuth, elevation)
         axes.set_title(title, fontsize=11, color="#333333")
     name = f"{model.info.get('preset', 'model')}, {model.info.get('resolution', '')}"
+    chosen = model.info.get("helmet", {}).get("chosen")
+    if chosen:
+        name += f", helmet {chosen['helmet']}, facemask {chosen['facemask']}"
     figure.suptitle(f"{name}: {len(model.hexes):,} hexahedra, {len(model.nodes):,} nodes", fontsize=14, y=0.975)
     looks = {_look(part) for part in model.parts}
     present = [look for look in _COLOURS if look in looks]
+    columns = len(present) if len(present) < 13 else 7
     figure.legend(
         handles=[Patch(facecolor=_COLOURS[r], edgecolor="#555555", label=r.replace("_", " ")) for r in present],
-        loc="lower center", ncol=len(present), frameon=False, fontsize=10, handlelength=1.2, columnspacing=1.4,
+        loc="lower center", ncol=columns, frameon=False, fontsize=10, handlelength=1.2, columnspacing=1.4,
     )  # fmt: skip
     with atomic_path(path) as temporary:
         figure.savefig(temporary, dpi=dots_per_inch, format="png", metadata={"Software": None})
@@ -116,10 +120,11 @@ def _paint(axes: Axes, model: Model, shown: np.ndarray, azimuth_deg: float, elev
     flat = np.stack([np.einsum("ijk,k->ij", corners[seen], v) for v in (right, up)], axis=-1)
     axes.add_collection(PolyCollection(list(flat), facecolors=colours, edgecolors=colours * 0.62, linewidths=0.35))
     low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
-    bar = np.array([low[0], low[1] - 0.012])
-    axes.plot([bar[0], bar[0] + 0.05], [bar[1]] * 2, color="#333333", linewidth=2.5, solid_capstyle="butt")
-    axes.text(bar[0] + 0.055, bar[1], "50 mm", fontsize=9, va="center", color="#333333")
+    span = 0.05 if high[1] - low[1] < 0.8 else 0.2
+    bar = np.array([low[0], low[1] - 0.24 * span])
+    axes.plot([bar[0], bar[0] + span], [bar[1]] * 2, color="#333333", linewidth=2.5, solid_capstyle="butt")
+    axes.text(bar[0] + 1.1 * span, bar[1], f"{1e3 * span:.0f} mm", fontsize=9, va="center", color="#333333")
     axes.set_xlim(low[0] - 0.01, high[0] + 0.01)
-    axes.set_ylim(low[1] - 0.02, high[1] + 0.01)
+    axes.set_ylim(low[1] - 0.4 * span, high[1] + 0.01)
     axes.set_aspect("equal")
     axes.axis("off")

@@ -7,7 +7,7 @@ is here too: the limit on the slope, without which hexes of a radial grid invert
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -147,9 +147,14 @@ class RadialSurfaces:
 
     def to_atlas(self, points: np.ndarray) -> np.ndarray:
         """MNI coordinates [mm] of points (n, 3) [m] relative to the star centre."""
-        x, y, z = (points * self.atlas_mm_per_m).T
-        c, s = np.cos(self.atlas_pitch_rad), np.sin(self.atlas_pitch_rad)
-        return np.stack([-y, c * x + s * z, c * z - s * x], axis=1) + np.array(self.atlas_centre_mm)
+        return to_atlas(points, self.atlas_centre_mm, self.atlas_mm_per_m, self.atlas_pitch_rad)
+
+
+def to_atlas(points: np.ndarray, centre_mm: Sequence[float], mm_per_m: float, pitch_rad: float) -> np.ndarray:
+    """MNI coordinates [mm] of points (n, 3) [m] relative to the star centre; see `RadialSurfaces`."""
+    x, y, z = (points * mm_per_m).T
+    c, s = np.cos(pitch_rad), np.sin(pitch_rad)
+    return np.stack([-y, c * x + s * z, c * z - s * x], axis=1) + np.array(centre_mm)
 
 
 def sample_directions() -> np.ndarray:

@@ -7,19 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from replay.motion.batch import Batch, Problem, State, cross_matrix
-from replay.motion.camera import translation
+from replay.motion.bands import RATIOS
+from replay.motion.batch import Batch, Problem
 from replay.motion.flips import estimate_both
 from replay.motion.kinematics import Kinematics
+from replay.motion.onset import BeforeOnset, before_onset, contact_index
 from replay.motion.protocol import ProtocolMotion, lens_of
 from replay.motion.readout import ANGULAR, LINEAR, read_out
 from replay.motion.settings import CameraSettings
+from replay.motion.told import Told, Turning, position_told, window
 from replay.motion.tracks import Template, Tracks
 
 DRAWS = 200
 NULL_REPLICATES = 8
 _SEED = 590940
-_MOST_FRAMES = 120
 
 
 @dataclass(frozen=True)
@@ -54,21 +55,34 @@ class Draws:
         """``(draws, g)`` CG acceleration along the line of sight."""
         return self.acceleration_m_per_s2 @ self.ray
 
+    def inner(self, margin_s: float) -> tuple[np.ndarray, np.ndarray]:
+        """Which points of the grid are at least `margin_s` from both ends, and their times [s]."""
+        inside = (self.time_s >= self.time_s[0] + margin_s) & (self.time_s <= self.time_s[-1] - margin_s)
+        return inside, self.time_s[inside]
+
     def peaks(self, margin_s: float) -> dict[str, np.ndarray]:
-        """Peaks of every draw ``(draws,)``, the first and last `margin_s` left out; ``t0_s`` is that of alpha's."""
-        inner = (self.time_s >= self.time_s[0] + margin_s) & (self.time_s <= self.time_s[-1] - margin_s)
-        a = self.acceleration_m_per_s2[:, inner]
-        along = self.along_ray[:, inner]
+        """Peaks of every draw ``(draws,)`` within the margins; ``t0_s`` is alpha's, ``onset_s`` the impact's."""
+        inside, time = self.inner(margin_s)
+        a = self.acceleration_m_per_s2[:, inside]
+        along = self.along_ray[:, inside]
         across = np.linalg.norm(a - along[..., None] * self.ray, axis=2)
-        alpha = np.linalg.norm(self.alpha_rad_per_s2[:, inner], axis=2)
+        alpha = np.linalg.norm(self.alpha_rad_per_s2[:, inside], axis=2)
+        total = np.linalg.norm(a, axis=2)
         return {
-            "omega_rad_per_s": np.linalg.norm(self.omega_rad_per_s[:, inner], axis=2).max(axis=1),
+            "omega_rad_per_s": np.linalg.norm(self.omega_rad_per_s[:, inside], axis=2).max(axis=1),
             "alpha_rad_per_s2": alpha.max(axis=1),
-            "a_m_per_s2": np.linalg.norm(a, axis=2).max(axis=1),
+            "a_m_per_s2": total.max(axis=1),
             "a_across_m_per_s2": across.max(axis=1),
             "a_along_m_per_s2": np.abs(along).max(axis=1),
-            "t0_s": self.time_s[inner][alpha.argmax(axis=1)],
+            "t0_s": time[alpha.argmax(axis=1)],
+            "onset_s": time[contact_index(alpha, total)],
         }
+
+    def relative_alpha(self, margin_s: float) -> np.ndarray:
+        """Mean over the draws of angular acceleration over its peak, ``(inner points,)``."""
+        inside, _ = self.inner(margin_s)
+        alpha = np.linalg.norm(self.alpha_rad_per_s2[:, inside], axis=2)
+        return (alpha / alpha.max(axis=1, keepdims=True)).mean(axis=0)
 
     def motion(self, draw: int) -> Kinematics:
         """One draw."""
@@ -95,6 +109,8 @@ class PosteriorMotion:
         ``(k,)`` times of the frames that were read [s].
     batch
         The most likely states over the clip.
+    before
+        Motion just before the impact.
     flip_margin
         Logarithm of the odds of the chosen path against its best twin; infinite where no twin ends apart.
     event_probability
@@ -107,9 +123,15 @@ class PosteriorMotion:
     draws: Draws
     frames_s: np.ndarray
     batch: Batch
+    before: BeforeOnset
     flip_margin: float
     event_probability: float
     null_peak_rad_per_s: float
+
+    @property
+    def fps(self) -> float:
+        """Frame rate [Hz]."""
+        return 1.0 / float(self.frames_s[1] - self.frames_s[0])
 
     @property
     def at_frames(self) -> tuple[np.ndarray, np.ndarray]:
@@ -121,12 +143,17 @@ class PosteriorMotion:
     @property
     def peaks(self) -> dict[str, np.ndarray]:
         """Peaks of every draw, the first and last frame interval left out."""
-        return self.draws.peaks(float(self.frames_s[1] - self.frames_s[0]))
+        return self.draws.peaks(1.0 / self.fps)
+
+    @property
+    def relative_alpha(self) -> np.ndarray:
+        """`Draws.relative_alpha`, the first and last frame interval left out."""
+        return self.draws.relative_alpha(1.0 / self.fps)
 
     @property
     def central(self) -> int:
         """The draw whose peaks lie closest to the medians: one motion that the clip allows, not a mean of many."""
-        table = np.stack([values if name == "t0_s" else np.log(values) for name, values in self.peaks.items()], axis=1)
+        table = np.stack([np.log(values) if name in RATIOS else values for name, values in self.peaks.items()], axis=1)
         off = (table - np.median(table, axis=0)) / np.maximum(table.std(axis=0), 1e-9)
         return int(np.argmin(np.sum(off**2, axis=1)))
 
@@ -171,33 +198,28 @@ def reconstruct_posterior(
     counts = np.round(draws * odds / odds.sum()).astype(int)
     rng = np.random.default_rng(seed)
     time = tracks.frames / camera.fps
-    parts, probability = [], 0.0
-    for path, count in zip(paths, counts):
-        if count > 0:
-            drawn, chance = _read_path(path, problem, time, rng, int(count), to_head)
-            parts.append(drawn)
-            probability += chance * count / counts.sum()
+    read = [_read_path(p, problem, time, rng, int(n), to_head) for p, n in zip(paths, counts) if n > 0]
+    drawn = read[0].draws if len(read) == 1 else _joined([path.draws for path in read])
+    onsets = drawn.peaks(float(time[1] - time[0]))["onset_s"]
     return PosteriorMotion(
-        draws=parts[0] if len(parts) == 1 else _joined(parts),
+        draws=drawn,
         frames_s=time,
         batch=paths[0],
+        before=before_onset(read[0].turning, read[0].position, onsets, camera),
         flip_margin=float(0.5 * (costs[1] - costs[0])) if len(costs) > 1 else float("inf"),
-        event_probability=probability,
+        event_probability=float(np.dot([path.event_probability for path in read], counts[counts > 0]) / counts.sum()),
         null_peak_rad_per_s=_null_peak(paths[0], time, rng) if null else float("nan"),
     )
 
 
 def _null_peak(batch: Batch, time: np.ndarray, rng: np.random.Generator) -> float:
     """Median peak of the angular read-out of a head at rest, seen by the same clicks with the same noise."""
-    keep = _window(batch.state, time)
-    information, _ = _marginal(batch.clicks_information[keep], batch.clicks_gradient[keep], slice(0, 3), slice(3, 6))
-    to_body = np.swapaxes(batch.state.rotation[keep], 1, 2)
-    information = to_body @ information @ np.swapaxes(to_body, 1, 2)
-    roots = np.linalg.cholesky(np.linalg.inv(_floored(information)))
+    told = Turning.of(batch, window(batch.state, time), time).told
+    roots = np.linalg.cholesky(np.linalg.inv(told.information))
     peaks = []
     for _ in range(NULL_REPLICATES):
         noise = (roots @ rng.standard_normal((len(roots), 3, 1)))[..., 0]
-        quiet = read_out(time[keep], noise, information, ANGULAR, rng, draws=100)
+        quiet = read_out(told.time_s, noise, told.information, ANGULAR, rng, draws=100)
         inner = slice(
             *np.searchsorted(quiet.time_s, [quiet.time_s[0] + time[1] - time[0], quiet.time_s[-1] - time[1] + time[0]])
         )
@@ -205,55 +227,42 @@ def _null_peak(batch: Batch, time: np.ndarray, rng: np.random.Generator) -> floa
     return float(np.median(peaks))
 
 
+@dataclass(frozen=True)
+class _Read:
+    """One path: its draws, what its frames tell, and whether there is an event."""
+
+    draws: Draws
+    turning: Turning
+    position: Told
+    event_probability: float
+
+
 def _read_path(
     batch: Batch, problem: Problem, time: np.ndarray, rng: np.random.Generator, count: int, to_head: Rotation
-) -> tuple[Draws, float]:
+) -> _Read:
     """Angular, then linear read-out along one path."""
-    state, camera = batch.state, problem.camera
-    keep = _window(state, time)
-    time = time[keep]
-    reference = Rotation.from_matrix(state.rotation[keep])
-    information, gradient = batch.clicks_information[keep], batch.clicks_gradient[keep]
-
-    # orientation: what each frame's clicks say of the turn away from the batch, its translation left free
-    # (log f is taken from the batch: a turn hardly feels it)
-    turn_information, turn_gradient = _marginal(information, gradient, slice(0, 3), slice(3, 6))
-    to_body = np.swapaxes(state.rotation[keep], 1, 2)
-    away = np.linalg.solve(_floored(turn_information), turn_gradient[..., None])
-    turns = (reference[:-1].inv() * reference[1:]).as_rotvec()
-    level = np.concatenate([np.zeros((1, 3)), np.cumsum(turns, axis=0)])
-    angular = read_out(
-        time,
-        (to_body @ away)[..., 0] + level,
-        to_body @ turn_information @ np.swapaxes(to_body, 1, 2),
-        ANGULAR,
-        rng,
-        draws=count,
-    )
-    grid = angular.time_s
-    steps = (len(grid) - 1) // (len(time) - 1)
-    share = (np.arange(len(grid)) % steps) / steps
-    at = np.minimum(np.arange(len(grid)) // steps, len(time) - 2)
-    share[-1] = 1.0
-    between = Rotation.from_rotvec(share[:, None] * turns[at])
-    base = reference[at] * between
-    off = angular.level - (level[at] + share[:, None] * turns[at])
+    camera, kept = problem.camera, window(batch.state, time)
+    turning = Turning.of(batch, kept, time)
+    told = turning.told
+    angular = read_out(told.time_s, told.values, told.information, ANGULAR, rng, draws=count)
+    base, level = turning.between(len(angular.time_s))
+    off = angular.level - level
     rotation = _compose(base, off)
 
     # position of the CG, with the orientation as the angular read-out left it
-    frames = slice(None, None, steps)
-    settled = off[:, frames]
-    mean_turn = np.einsum("kij,kj->ki", state.rotation[keep], settled.mean(axis=0))
-    spread = np.einsum("dki,dkj->kij", settled - settled.mean(axis=0), settled - settled.mean(axis=0)) / max(
-        count - 1, 1
-    )
-    position, position_information = _cg(batch, problem, keep, mean_turn, spread)
-    centre = position.mean(axis=0)
-    told = angular.event_s[np.isfinite(angular.event_s)]
+    settled = off[:, :: (len(angular.time_s) - 1) // (len(told.time_s) - 1)]
+    mean = settled.mean(axis=0)
+    spread = np.einsum("dki,dkj->kij", settled - mean, settled - mean) / max(count - 1, 1)
+    turned = np.einsum("kij,kj->ki", batch.state.rotation[kept], mean)
+    position = position_told(batch, problem, kept, time, turned, spread)
+    centre = position.values.mean(axis=0)
+    found = angular.event_s[np.isfinite(angular.event_s)]
     hint = None
-    if len(told) > 0.5 * count:
-        hint = (float(np.median(told)), float(np.sqrt(0.008**2 + np.var(told))))
-    linear = read_out(time, position - centre, position_information, LINEAR, rng, draws=count, instant=hint)
+    if len(found) > 0.5 * count:
+        hint = (float(np.median(found)), float(np.sqrt(0.008**2 + np.var(found))))
+    linear = read_out(
+        position.time_s, position.values - centre, position.information, LINEAR, rng, draws=count, instant=hint
+    )
 
     to_global = camera.rotation_to_global
     whole = _turned(to_global, rotation)
@@ -264,67 +273,17 @@ def _read_path(
         return to_global.apply(values.reshape(-1, 3)).reshape(values.shape)
 
     ray = to_global.apply(centre / np.linalg.norm(centre))
-    return (
-        Draws(
-            time_s=grid,
-            rotation=head,
-            position_m=vectors(linear.level + centre),
-            velocity_m_per_s=vectors(linear.rate),
-            acceleration_m_per_s2=vectors(linear.slope),
-            omega_rad_per_s=apply(angular.rate.reshape(-1, 3)).reshape(angular.rate.shape),
-            alpha_rad_per_s2=apply(angular.slope.reshape(-1, 3)).reshape(angular.slope.shape),
-            ray=ray,
-        ),
-        angular.event_probability,
+    draws = Draws(
+        time_s=angular.time_s,
+        rotation=head,
+        position_m=vectors(linear.level + centre),
+        velocity_m_per_s=vectors(linear.rate),
+        acceleration_m_per_s2=vectors(linear.slope),
+        omega_rad_per_s=apply(angular.rate.reshape(-1, 3)).reshape(angular.rate.shape),
+        alpha_rad_per_s2=apply(angular.slope.reshape(-1, 3)).reshape(angular.slope.shape),
+        ray=ray,
     )
-
-
-def _window(state: State, time: np.ndarray) -> slice:
-    """At most 120 frames around the fastest change of the turn."""
-    if len(time) <= _MOST_FRAMES:
-        return slice(None)
-    rotation = Rotation.from_matrix(state.rotation)
-    turn = (rotation[1:] * rotation[:-1].inv()).as_rotvec()
-    middle = 1 + int(np.argmax(np.linalg.norm(np.diff(turn, axis=0), axis=1)))
-    first = int(np.clip(middle - _MOST_FRAMES // 2, 0, len(time) - _MOST_FRAMES))
-    return slice(first, first + _MOST_FRAMES)
-
-
-def _floored(information: np.ndarray) -> np.ndarray:
-    floor = 1e-9 * np.einsum("kii->k", information).max()
-    return information + floor * np.eye(information.shape[-1])
-
-
-def _marginal(information: np.ndarray, gradient: np.ndarray, kept: slice, free: slice) -> tuple[np.ndarray, np.ndarray]:
-    """Information and gradient of some unknowns with others left free (Schur complement)."""
-    a, b = information[:, kept, kept], information[:, kept, free]
-    c = information[:, free, free]
-    scale = 1e-12 * np.einsum("kii->ki", c).max(axis=0)
-    ratio = b @ np.linalg.inv(c + np.eye(c.shape[-1]) * scale[:, None])
-    return a - ratio @ np.swapaxes(b, 1, 2), gradient[:, kept] - (ratio @ gradient[:, free, None])[..., 0]
-
-
-def _cg(
-    batch: Batch, problem: Problem, keep: slice, turn: np.ndarray, turn_covariance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """CG in camera axes ``(k, 3)`` and its information, given the settled orientation: mean, body covariance."""
-    state = batch.state
-    information, gradient = batch.clicks_information[keep], batch.clicks_gradient[keep]
-    rotation, shift = state.rotation[keep], state.shift[keep]
-    origin, arm = translation(shift), state.rotation[keep] @ problem.arm_m
-    move = np.zeros((len(shift), 3, 3))
-    move[:, 0, 0] = move[:, 1, 1] = origin[:, 2]
-    move[:, :, 2] = origin
-    c, b = information[:, 3:6, 3:6], information[:, 3:6, :3]
-    scale = 1e-9 * np.einsum("kii->ki", c).max(axis=0)
-    inverse = np.linalg.inv(c + np.eye(3) * scale[:, None])
-    follow = -inverse @ b
-    step = (inverse @ gradient[:, 3:6, None])[..., 0] + np.einsum("kij,kj->ki", follow, turn)
-    carried = move @ follow - cross_matrix(arm)
-    spread = carried @ rotation
-    covariance = move @ inverse @ np.swapaxes(move, 1, 2) + spread @ turn_covariance @ np.swapaxes(spread, 1, 2)
-    position = origin + arm + np.einsum("kij,kj->ki", move, step) - np.cross(arm, turn)
-    return position, np.linalg.inv(covariance)
+    return _Read(draws, turning, position, angular.event_probability)
 
 
 def _compose(base: Rotation, off: np.ndarray) -> np.ndarray:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from replay.motion.events import Shape, background, few_shapes, shapes
+from replay.motion.told import Told
 
 EVENT_PRIOR = 0.9
 """Probability of an event beforehand: most clips that are clicked show one."""
@@ -217,6 +218,47 @@ def read_out(
     # both passes must spread the same prior over time: as many instants as the whole clip has at this spacing
     weights, none = _weights(fits, prior(fine) + np.log(len(fine) / (3.0 * len(coarse))))
     return _draw(frames, fits, weights, none, rng, draws)
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """A slow motion at one instant.
+
+    Parameters
+    ----------
+    time_s
+        ``(g,)`` grid through all frames [s].
+    level, rate, slope
+        ``(3,)`` integral of the rate, rate and its derivative at the instant.
+    covariance
+        ``(3, 3)`` of the rate.
+    """
+
+    time_s: np.ndarray
+    level: np.ndarray
+    rate: np.ndarray
+    slope: np.ndarray
+    covariance: np.ndarray
+
+
+def read_quiet(told: Told, scales: Scales, until_s: float, at_s: float) -> Quiet:
+    """Motion without an event at `at_s`, from the frames before `until_s` alone."""
+    used = (told.time_s < until_s)[:, None]
+    frames = _Frames(
+        told.time_s, np.where(used, told.values, 0.0), np.where(used[..., None], told.information, 0.0), scales
+    )
+    white = frames.whiten(frames.scaled[None])[0]
+    covariance = np.eye(white.shape[1]) - white.T @ white
+    slow = (frames.white @ white).reshape(-1, 3) * frames.spread[:, None]
+    here = int(np.searchsorted(frames.fine_s, at_s - 1e-9))
+    rate = np.kron(frames.spread[1:] * frames.background_rate[here], np.eye(3))
+    return Quiet(
+        time_s=frames.fine_s,
+        level=slow[0] + frames.background_level[here] @ slow[1:],
+        rate=frames.background_rate[here] @ slow[1:],
+        slope=frames.background_slope[here] @ slow[1:],
+        covariance=rate @ covariance[3:, 3:] @ rate.T,
+    )
 
 
 def _leading_axis(fits: list[_Fits], weights: list[np.ndarray]) -> np.ndarray:

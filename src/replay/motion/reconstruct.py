@@ -10,9 +10,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from replay.files import write_text
-from replay.motion.bands import band
 from replay.motion.clip import load_clip
-from replay.motion.driver import Driver, axis_points, build_driver
+from replay.motion.driver import Driver, build_driver
+from replay.motion.initial_conditions import INITIAL_CONDITIONS, condition, velocity_bands
 from replay.motion.kinematics import KINEMATICS, Kinematics
 from replay.motion.null import null_peaks
 from replay.motion.posterior import PosteriorMotion, reconstruct_posterior
@@ -29,6 +29,7 @@ from replay.motion.side_by_side import (
     peak_rows,
     posterior_quality,
     spin_band,
+    t0_band,
 )
 from replay.motion.summary import summary
 from replay.motion.wearable import read_wearable, reconstruct_wearable
@@ -62,27 +63,6 @@ POSES = TableFormat(
     ),
 )
 """Format of ``poses_per_frame.csv``."""
-
-INITIAL_CONDITIONS = TableFormat(
-    "initial conditions",
-    (
-        Column("mode", "protocol, posterior or wearable", kind="text"),
-        Column("instant", "t0, or window_start: the first sample of the driver", kind="text"),
-        Column("time_s", "time on the clock of kinematics.csv [s]"),
-        *_vector("{}_m", "of the skull CG, global [m]"),
-        *(Column(f"q{c}", f"quaternion head to global, {c}") for c in "xyzw"),
-        *_vector("v{}_m_per_s", "of the CG velocity, global [m/s]"),
-        *_vector("omega_{}_rad_per_s", "of the angular velocity, global [rad/s]"),
-        Column("spin_rad_per_s", "magnitude of the angular velocity, about the axis from P to Q [rad/s]"),
-        *_vector("p{}_m", "of P, on the axis: the skull CG [m]"),
-        *_vector("q{}_axis_m", "of Q, one metre along the axis [m]"),
-        Column("a_m_per_s2", "resultant CG acceleration [m/s^2]"),
-        Column("alpha_rad_per_s2", "resultant angular acceleration [rad/s^2]"),
-        Column("spin_lo_rad_per_s", "lower end of the spin's 95 % band [rad/s]", may_be_empty=True),
-        Column("spin_hi_rad_per_s", "upper end of the spin's 95 % band [rad/s]", may_be_empty=True),
-    ),
-)
-"""Format of ``initial_conditions_t0.csv``: protocol mode, then posterior mode where there is one."""
 
 QC = TableFormat(
     "quality per frame",
@@ -163,7 +143,7 @@ class Reconstruction:
         """Impact reference of the play in posterior mode [s]."""
         assert self.posterior is not None
         if self.play.t0 == "angular":
-            return band("t0_s", self.posterior.peaks["t0_s"]).value
+            return t0_band(self.posterior).value
         motion = self.posterior.draws.motion(self.posterior.central)
         return float(motion.time_s[peak_frame(motion.linear_resultant)])
 
@@ -214,48 +194,33 @@ class Reconstruction:
         return tuple(folder / name for name in self.files)
 
     def _conditions(self) -> dict[str, list[Any]]:
-        out: dict[str, list[Any]] = {name: [] for name in INITIAL_CONDITIONS.names}
         mode = "wearable" if self.posterior is None else "protocol"
         driver = build_driver(self.kinematics, self.t0_s, self.play.window)
-        self._add_conditions(out, mode, "t0", self.t0_s, self.kinematics)
-        self._add_conditions(out, mode, "window_start", driver.start_s, driver.motion, row=0)
-        if self.posterior is not None:
+        rows = [
+            condition(mode, "t0", self.t0_s, self.kinematics, _sample(self.kinematics, self.t0_s), {}),
+            condition(mode, "window_start", driver.start_s, driver.motion, 0, {}),
+        ]
+        if self.posterior is not None and self.posterior_quality is not None:
             motion, t0 = self.posterior.draws.motion(self.posterior.central), self.posterior_t0_s
             start = t0 - self.play.window.before_t0_s
             # where footage resolves no instant, the window may begin before the clip
             for instant, time in (("t0", t0), ("window_start", max(start, float(motion.time_s[0])))):
-                self._add_conditions(out, "posterior", instant, time, motion)
-        return out
+                at = _sample(motion, time)
+                bands = {"spin_rad_per_s": spin_band(self.posterior, at)}
+                if instant == "t0" and self.play.t0 == "angular" and self.posterior_quality.bands["t0_s"].resolved:
+                    bands["time_s"] = self.posterior_quality.bands["t0_s"].ends
+                rows.append(condition("posterior", instant, time, motion, at, bands))
+            onset = self.posterior_quality.bands["onset_s"]
+            if onset.resolved:
+                before = self.posterior.before
+                bands = {"time_s": onset.ends, **velocity_bands(before)}
+                rows.append(condition("posterior", "onset", before.motion.time_s[0], before.motion, 0, bands))
+        return {name: [row[name] for row in rows] for name in INITIAL_CONDITIONS.names}
 
-    def _add_conditions(
-        self,
-        out: dict[str, list[Any]],
-        mode: str,
-        instant: str,
-        time: float,
-        motion: Kinematics,
-        row: int | None = None,
-    ) -> None:
-        at = int(np.argmin(np.abs(motion.time_s - time))) if row is None else row
-        columns = motion.columns()
-        axis = axis_points(motion.position_m[at], motion.omega_rad_per_s[at])
-        p, q = np.asarray(axis["P_m"]), np.asarray(axis["Q_m"])
-        low = high = float("nan")
-        if mode == "posterior":
-            assert self.posterior is not None
-            low, high = spin_band(self.posterior, at)
-        values: dict[str, Any] = {
-            "mode": mode,
-            "instant": instant,
-            "time_s": float(time),
-            "spin_rad_per_s": axis["spin_rad_per_s"],
-            "spin_lo_rad_per_s": low,
-            "spin_hi_rad_per_s": high,
-        }
-        for i, a in enumerate("xyz"):
-            values[f"p{a}_m"], values[f"q{a}_axis_m"] = float(p[i]), float(q[i])
-        for name in out:
-            out[name].append(values[name] if name in values else float(columns[name][at]))
+
+def _sample(motion: Kinematics, time_s: float) -> int:
+    """Index of the sample nearest to a time."""
+    return int(np.argmin(np.abs(motion.time_s - time_s)))
 
 
 def check_tracks(play: Play) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from replay.motion.settings import CameraSettings
 from replay.motion.tracks import Template, Tracks
 from replay.tables import Column, TableFormat
 
+COMPETE = "{} instants compete"
+"""Where the band of an instant is in several parts."""
 DECIDED_FLIP = 3.0
 """Log odds from which the path is told from its mirrored twin: twenty to one."""
 _CURVE_UNITS = {"omega": "rad_per_s", "alpha": "rad_per_s2", "a": "m_per_s2"}
@@ -57,7 +59,7 @@ PEAKS = TableFormat(
         Column("posterior", "posterior mode: between the frames; empty where not resolvable", may_be_empty=True),
         Column("posterior_lo", "lower end of its 95 % band", may_be_empty=True),
         Column("posterior_hi", "upper end of its 95 % band", may_be_empty=True),
-        Column("resolved", f"yes, or `{NOT_RESOLVABLE}`", kind="text"),
+        Column("resolved", f"yes, `{COMPETE.format('k')}`, or `{NOT_RESOLVABLE}`", kind="text"),
     ),
 )
 """Format of ``peaks.csv``."""
@@ -107,7 +109,14 @@ class PosteriorQuality:
         """For ``quality.json``."""
         return {
             "bands": {
-                name: {"value": b.value, "low": b.low, "high": b.high} if b.resolved else NOT_RESOLVABLE
+                name: {
+                    "value": b.value,
+                    "low": b.low,
+                    "high": b.high,
+                    **({"parts": [[p.low, p.high, p.chance] for p in b.parts]} if b.parts else {}),
+                }
+                if b.resolved
+                else NOT_RESOLVABLE
                 for name, b in self.bands.items()
             },
             "band_class": self.band_class,
@@ -119,7 +128,7 @@ class PosteriorQuality:
 
     def gate_values(self) -> dict[str, float | bool | str]:
         """Posterior mode's part of the reconstruction gate."""
-        omega = self.bands["omega_rad_per_s"]
+        omega, t0 = self.bands["omega_rad_per_s"], self.bands["t0_s"]
         return {
             "posterior_flip_margin": (
                 self.flip_margin if np.isfinite(self.flip_margin) else "no mirrored twin of the path fits the clicks"
@@ -131,6 +140,8 @@ class PosteriorQuality:
             "peak_omega_resolved_detail": f"peak angular velocity {omega.text()} rad/s"
             if omega.resolved
             else f"peak angular velocity is {NOT_RESOLVABLE}",
+            "t0_resolved": t0.resolved and not t0.parts,
+            "t0_resolved_detail": f"{UNITS['t0_s'][0]}: {t0.text(1e-3, '.1f')}{' ms' if t0.resolved else ''}",
         }
 
 
@@ -153,13 +164,22 @@ def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: Camera
     if posterior.flip_margin < DECIDED_FLIP:
         outside.append("the clicks do not tell the path from its mirrored twin")
     return PosteriorQuality(
-        bands={name: band(name, values) for name, values in posterior.peaks.items()},
+        bands={
+            name: t0_band(posterior) if name == "t0_s" else band(name, values, posterior.fps)
+            for name, values in posterior.peaks.items()
+        },
         band_class="calibrated" if not outside else "extrapolated: " + "; ".join(outside),
         flip_margin=posterior.flip_margin,
         event_probability=posterior.event_probability,
         null_peak_rad_per_s=posterior.null_peak_rad_per_s,
         click_sigma_px=batch.sigma_px,
     )
+
+
+def t0_band(posterior: PosteriorMotion) -> Band:
+    """Band of the instant of peak angular acceleration."""
+    _, time = posterior.draws.inner(1.0 / posterior.fps)
+    return constants().instants(time, posterior.relative_alpha)
 
 
 def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:
@@ -172,7 +192,7 @@ def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:
         ("alpha", draws.alpha_rad_per_s2[:, at]),
         ("a", draws.acceleration_m_per_s2[:, at]),
     ):
-        factor = constants().curves[curve]
+        factor = constants().at_rate(constants().curves[curve], posterior.fps)
         columns = [*(values[..., i] for i in range(3)), np.linalg.norm(values, axis=2)]
         for (stem, _), column in zip(_names(curve), columns):
             mean, sigma = column.mean(axis=0), column.std(axis=0)
@@ -189,7 +209,7 @@ def curves(posterior: PosteriorMotion, frames: int) -> dict[str, np.ndarray]:
 def spin_band(posterior: PosteriorMotion, at: int) -> tuple[float, float]:
     """95 % band of the angular velocity's magnitude at a point of the grid [rad/s]."""
     spin = np.linalg.norm(posterior.draws.omega_rad_per_s[:, at], axis=1)
-    half = constants().curves["omega"] * float(spin.std())
+    half = constants().at_rate(constants().curves["omega"], posterior.fps) * float(spin.std())
     return max(float(spin.mean()) - half, 0.0), float(spin.mean()) + half
 
 
@@ -207,7 +227,9 @@ def peak_rows(quality: PosteriorQuality, protocol: dict[str, float], null: dict[
         "posterior": told([b.value for b in bands]),
         "posterior_lo": told([b.low for b in bands]),
         "posterior_hi": told([b.high for b in bands]),
-        "resolved": ["yes" if b.resolved else NOT_RESOLVABLE for b in bands],
+        "resolved": [
+            NOT_RESOLVABLE if not b.resolved else COMPETE.format(len(b.parts)) if b.parts else "yes" for b in bands
+        ],
     }
 
 
@@ -232,6 +254,9 @@ def advice(quality: PosteriorQuality, tracks: Tracks, camera: CameraSettings, sc
     mend = []
     landmarks = int(np.median(tracks.seen.sum(axis=1)))
     accelerations = any(not quality.bands[name].resolved for name in ("alpha_rad_per_s2", "a_across_m_per_s2"))
+    t0 = quality.bands["t0_s"]
+    if t0.parts and t0.resolved:
+        mend.append(f"t0: {COMPETE.format(len(t0.parts))}, lobes of like height: replay each, or film faster")
     if camera.fps < 115.0 and accelerations:
         mend.append(f"frame rate: at {camera.fps:g} fps a pulse of 10 ms falls between frames; 240 fps would show it")
     if landmarks < 6:

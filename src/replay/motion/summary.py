@@ -5,9 +5,28 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from replay.motion.bands import QUANTITIES, UNITS
+from replay.motion.initial_conditions import velocity_bands
 
 if TYPE_CHECKING:
     from replay.motion.reconstruct import Reconstruction
+
+
+def _before(result: Reconstruction) -> list[str]:
+    """Velocities just before the impact, where its onset is known."""
+    assert result.posterior is not None
+    assert result.posterior_quality is not None
+    if not result.posterior_quality.bands["onset_s"].resolved:
+        return []
+    before = result.posterior.before
+    bands, lines = velocity_bands(before), []
+    for stem, unit, words, values in (
+        ("v", "m_per_s", "CG velocity before it [m/s]", before.motion.velocity_m_per_s[0]),
+        ("omega_", "rad_per_s", "angular velocity before it [rad/s]", before.motion.omega_rad_per_s[0]),
+    ):
+        halves = [0.5 * (high - low) for low, high in (bands[f"{stem}{a}_{unit}"] for a in "xyz")]
+        told = ", ".join(f"{a} {v:.2f} +- {h:.2f}" for a, v, h in zip("xyz", values, halves))
+        lines.append(f"{words:38s} {told}")
+    return lines
 
 
 def summary(result: Reconstruction) -> str:
@@ -29,8 +48,9 @@ def summary(result: Reconstruction) -> str:
         for name in QUANTITIES:
             label, unit, scale = UNITS[name]
             band = posterior.bands[name]
-            digits = 4 if name == "t0_s" else 3
-            lines.append(f"{label:38s} {band.text(scale, digits)}{f' {unit}' if band.resolved else ''}")
+            form = ".1f" if unit == "ms" else ".3g"
+            lines.append(f"{label:38s} {band.text(scale, form)}{f' {unit}' if band.resolved else ''}")
+        lines += _before(result)
         margin = posterior.document()["flip_margin"]
         lines += [
             f"{'noise alone would show':38s} {posterior.null_peak_rad_per_s:.3g} rad/s",
@@ -64,8 +84,6 @@ def summary(result: Reconstruction) -> str:
     if quality.kind == "clicks":
         lines += [
             "",
-            "Noise alone is the peak that a head standing still would show under the same clicks:",
-            "a peak is worth its ratio to it.",
-            "HIC is not computed from footage; it comes from the finite-element head.",
+            "Noise alone: the peak of a head at rest under the same clicks. HIC comes from the finite-element head.",
         ]
     return "\n".join(line.rstrip() for line in lines) + "\n"

@@ -13,9 +13,13 @@ from replay.play.controls import (
     Shake,
     SolverSettings,
 )
+from replay.play.cost import Estimate, estimate
 from replay.play.description import Play, ReconstructionChoice, Window, load_play, play_schema, play_schema_text
+from replay.play.ensemble import ADDRESS, EnsembleSettings, Member, members_of, read_ensemble
 from replay.play.fields import InputFile, NotNegative, Positive, Quaternion, Vector3
 from replay.play.model import HELMET_MASS_KG, HELMET_MASS_RANGE_KG, Helmet, ModelChoice
+from replay.play.overrides import overridden
+from replay.play.table import Row, read_plays_table, write_out
 from replay.play.video import ClicksSource
 from replay.play.wearable import (
     AccelerationColumns,
@@ -32,6 +36,7 @@ from replay.play.wearable import (
 )
 
 __all__ = [
+    "ADDRESS",
     "HELMET_MASS_KG",
     "HELMET_MASS_RANGE_KG",
     "AccelerationColumns",
@@ -44,12 +49,15 @@ __all__ = [
     "ClicksSource",
     "Collision",
     "Contact",
+    "EnsembleSettings",
+    "Estimate",
     "Filter",
     "FrictionPair",
     "GivenStart",
     "Helmet",
     "Hourglass",
     "InputFile",
+    "Member",
     "ModelChoice",
     "NoFilter",
     "NotNegative",
@@ -59,6 +67,7 @@ __all__ = [
     "Quaternion",
     "ReconstructedStart",
     "ReconstructionChoice",
+    "Row",
     "Shake",
     "SolverSettings",
     "TimeColumn",
@@ -66,7 +75,13 @@ __all__ = [
     "WearableColumns",
     "WearableSource",
     "Window",
+    "estimate",
     "load_play",
+    "members_of",
+    "overridden",
     "play_schema",
     "play_schema_text",
+    "read_ensemble",
+    "read_plays_table",
+    "write_out",
 ]

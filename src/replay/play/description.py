@@ -38,6 +38,18 @@ class ReconstructionChoice(Setting):
     ensemble: Annotated[int, Field(ge=0, le=200)] = Field(
         default=0, description="Number of drivers drawn from the posterior, for an ensemble of replays; 0 for none."
     )
+    draw: Annotated[int, Field(ge=0, le=200)] = Field(
+        default=0,
+        description="Which of these drivers drives the replay, not the mode's own motion; 0 for none.",
+    )
+
+    @field_validator("draw")
+    @classmethod
+    def _is_drawn(cls, value: int, info: ValidationInfo) -> int:
+        if value > info.data.get("ensemble", value):
+            count = info.data["ensemble"]
+            refuse(f"driver {value} of {count}", f"at most {count}", "raise `reconstruction.ensemble`")
+        return value
 
 
 class Play(Setting):

@@ -69,6 +69,14 @@ class ModelChoice(Setting):
         default="brain_isv",
         description="Law of the brain: `brain_isv` with its damage variable, or `viscohyperelastic` without.",
     )
+    membranes: Literal["none", "cables"] = Field(
+        default="none",
+        description="Falx and tentorium: `none`, or `cables`, sheets of dura as nets of cables that only pull.",
+    )
+    outlet: Literal["closed", "open"] = Field(
+        default="closed",
+        description="Skull below the brainstem: `closed`, or `open` with fluid in the foramen magnum.",
+    )
     helmet: HelmetPiece = Field(
         default="classic",
         description="Helmet: `classic` in the article's proportions, `modern` thicker and heavier, or a YAML file "

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from replay.report.figure import Picture
@@ -146,6 +147,33 @@ def table(
         f'<div class="scroll" tabindex="0" role="region" aria-label="{text(caption)}"><table{stacked}>'
         f"<caption>{text(caption)}</caption><thead><tr>{top}</tr></thead>"
         f"<tbody>{''.join(body)}</tbody></table></div>{under}"
+    )
+
+
+def document(title: str, kicker: str, lead: str, content: str, *, style: str = "") -> str:
+    """Return a whole page without scripts or links to other hosts.
+
+    Parameters
+    ----------
+    title, kicker
+        Plain text: the heading, and the line over it.
+    lead
+        HTML under the heading.
+    content
+        HTML of the sections.
+    style
+        Style sheet after the house's.
+    """
+    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{text(title)}</title>\n<style>\n{css}{style}</style></head>\n<body>"
+        f'<header><div class="inner"><p class="kicker">{text(kicker)}</p><h1>{text(title)}</h1>{lead}</div></header>\n'
+        f"<main>{content}</main>\n"
+        "<footer><p>Process diagnostics of computed replays. No medical statement, no helmet rating.</p></footer>"
+        "</body></html>\n"
     )
 
 

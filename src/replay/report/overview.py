@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
-from replay.report.markup import badge, number, section, table, text, unit
+from replay.report.markup import badge, document, number, section, table, text, unit
 
 _KIND = {
     "ACCEPTED": "pass",
@@ -53,18 +52,13 @@ def overview_page(rows: Sequence[Mapping[str, Any]]) -> str:
         "cell was not reached. Over noise: the peak angular velocity over the one that clicks alone would show.",
         stack=True,
     )
-    css = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
-        "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n"
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{len(rows)} plays</title>\n<style>\n{css}main, header .inner, footer {{ max-width: 100rem; }}\n"
-        "tbody th, td:nth-last-child(2) { min-width: 12rem; overflow-wrap: anywhere; }\n</style></head>\n<body>"
-        '<header><div class="inner"><p class="kicker">Finite-element replays of single plays</p>'
-        f"<h1>{len(rows)} plays</h1><p>{text(summary)}</p></div></header>\n"
-        f"<main>{section('plays', 'Plays', body)}</main>\n"
-        "<footer><p>Process diagnostics of computed replays. No medical statement, no helmet rating.</p></footer>"
-        "</body></html>\n"
+    return document(
+        f"{len(rows)} plays",
+        "Finite-element replays of single plays",
+        f"<p>{text(summary)}</p>",
+        section("plays", "Plays", body),
+        style="main, header .inner, footer { max-width: 100rem; }\n"
+        "tbody th, td:nth-last-child(2) { min-width: 12rem; overflow-wrap: anywhere; }\n",
     )
 
 

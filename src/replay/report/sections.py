@@ -93,6 +93,7 @@ _PEAK_WORDS = {
     "a_across_m_per_s2": ("Linear acceleration across the line of sight", "m/s^2", 1.0),
     "a_along_m_per_s2": ("Linear acceleration along the line of sight", "m/s^2", 1.0),
     "t0_s": ("Instant of peak angular acceleration", "ms", 1e3),
+    "onset_s": ("Onset of the impact", "ms", 1e3),
 }
 
 
@@ -107,9 +108,9 @@ def both_modes_table(report: ReportInput) -> str:
             scale * float(v)
             for v in (row.protocol, row.protocol_null, row.posterior, row.posterior_lo, row.posterior_hi)
         )
-        told = row.resolved == "yes"
-        band = f"{number(value, 3)} ({number(low, 3)} to {number(high, 3)})" if told else text(str(row.resolved))
-        rows.append([f"{words} ({unit(measure)})", number(found, 3), number(noise, 3) if noise == noise else "–", band])
+        band = f"{number(value, 3)} ({number(low, 3)} to {number(high, 3)})" if value == value else ""
+        band += "" if row.resolved == "yes" else f"{', ' if band else ''}{text(str(row.resolved))}"
+        rows.append([f"{words} ({unit(measure)})", number(found, 3), number(noise, 3), band])
     return table(
         "Peaks in both modes",
         ["Quantity", "Protocol mode", "Protocol mode, head at rest", "Posterior mode (95 % band)"],

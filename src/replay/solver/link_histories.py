@@ -110,9 +110,11 @@ class TableRecorder:
 
 def link_recorders(problem: Problem) -> list[Recorder]:
     """Recorders of all that a problem has of joints, straps, ties and rigid sets."""
+    kept = tuple(k for k, strap in enumerate(problem.straps) if strap.recorded)
+    straps = tuple(problem.straps[k] for k in kept)
     kinds: tuple[tuple[TableFormat, str, tuple[Any, ...], Callable[[StateView], NDArray[np.float64]]], ...] = (
         (JOINT_TABLE, "joints.csv", problem.joints, _joint_rows),
-        (STRAP_TABLE, "straps.csv", problem.straps, lambda view: view.links.strap_rows[:, [LENGTH, NATURAL, TENSION]]),
+        (STRAP_TABLE, "straps.csv", straps, lambda view: view.links.strap_rows[kept, :][:, [LENGTH, NATURAL, TENSION]]),
         (TIE_TABLE, "ties.csv", problem.ties, lambda view: view.tied.resultants()),
         (RIGID_SET_TABLE, "rigid_sets.csv", problem.rigid_sets, _set_rows),
     )

@@ -35,6 +35,8 @@ class Strap:
         Length that it has to spare at time 0.
     pay_in_m, pay_in_time_s
         Length that a buckle takes in, evenly over this time from time 0 on (at once, if it is 0).
+    recorded
+        Whether ``straps.csv`` has it; a net of many cables would be a table that nobody reads.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Strap:
     slack_m: float = 0.0
     pay_in_m: float = 0.0
     pay_in_time_s: float = 0.0
+    recorded: bool = True
 
     def check(self, nodes: NDArray[np.float64]) -> None:
         """Refuse what is no strap.

@@ -15,9 +15,9 @@ from replay.models import Model
 from replay.play import Play
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.frame import Stage, Workspace
+from replay.stages.limits import limits_of, told
 from replay.stages.problem import controls_of, resting_problem, seated_by_contact, unresolved_pairs
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of, told
+from replay.stages.resolved import read_settings
 
 _MOST_PLACES = 4
 _PIECES = ("helmet", "facemask", "pads", "chinstrap")
@@ -61,6 +61,8 @@ def _player(stage: Stage, play: Play, role: str) -> tuple[Model, list[gates.Gate
         design=models.load_design(*pieces, folder=play.folder),
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
+        membranes=play.model.membranes,
+        outlet=play.model.outlet,
         seat=play.model.helmet_seat,
     )
     before = "" if role == "struck" else f"{role}_"

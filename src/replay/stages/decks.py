@@ -11,13 +11,13 @@ from replay import decks
 from replay.files import read_json
 from replay.models import Model, read_model
 from replay.motion import Kinematics
-from replay.play import Play
+from replay.play import Play, estimate
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import replayed_model
 from replay.stages.own_deck import model_facts, node_sets, region_sets
 from replay.stages.players import PLAYER_SETS
 from replay.stages.problem import chin_straps, seated_by_contact
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.
 _HOURGLASS_METHODS = {"stiffness": 4, "selective": 4, "viscous": 1}
@@ -44,6 +44,15 @@ def run(workspace: Workspace) -> str | None:
     for solver, write in _WRITERS:
         for path in write(folder / solver, deck):
             stage.write(path.relative_to(folder).as_posix(), f"run deck for {solver}")
+    asked = estimate(play.model.resolution, play.window.duration_s)
+    script = decks.write_own_submit(
+        folder / "replay",
+        workspace.play,
+        threads=asked.threads,
+        memory_mb=asked.memory_mb,
+        minutes=asked.minutes,
+    )
+    stage.write(script.relative_to(folder).as_posix(), "batch script for the solver of this program")
     return stage.finish()
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from replay.files import read_json, write_json
 from replay.motion import Kinematics, build_driver
 from replay.stages.frame import Stage, Workspace
 from replay.stages.players import ROLES, start_of
-from replay.stages.settings import read_settings
+from replay.stages.resolved import read_settings
 
 
 def run(workspace: Workspace) -> str | None:
@@ -15,10 +17,17 @@ def run(workspace: Workspace) -> str | None:
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
-    source = "kinematics.csv" if play.reconstruction.mode == "protocol" else "posterior_motion.csv"
-    kinematics = Kinematics.read(stage.read("reconstruction", source))
+    chosen = play.reconstruction
+    source = "kinematics.csv" if chosen.mode == "protocol" else "posterior_motion.csv"
+    motion = Kinematics.read(stage.read("reconstruction", source))
     t0 = read_json(stage.read("reconstruction", "quality.json"))["driving_t0_s"]
-    driver = build_driver(kinematics, t0, play.window)
+    if chosen.draw:
+        # a drawn driver is sampled already, on a clock that begins with the window
+        drawn = Kinematics.read(stage.read("reconstruction", f"drivers/driver_{chosen.draw:03d}.csv"))
+        driver = build_driver(drawn, play.window.before_t0_s, play.window)
+        driver = replace(driver, start_s=t0 - play.window.before_t0_s)
+    else:
+        driver = build_driver(motion, t0, play.window)
     driver.write(
         stage.write_all(
             {
@@ -28,7 +37,7 @@ def run(workspace: Workspace) -> str | None:
         )
     )
     if play.collision is not None:
-        starts = {role: start_of(play.collision, role, kinematics, driver.start_s).to_json() for role in ROLES}
+        starts = {role: start_of(play.collision, role, motion, driver.start_s).to_json() for role in ROLES}
         write_json(stage.write("starts.json", "posture and velocities of both players at first contact"), starts)
     quality = driver.quality
     print(

@@ -10,9 +10,9 @@ from replay.measures import Motion, fidelity
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import replayed_model
+from replay.stages.limits import limits_of
 from replay.stages.players import ROLES
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.resolved import read_settings
 
 
 def run(workspace: Workspace) -> str | None:

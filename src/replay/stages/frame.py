@@ -6,6 +6,7 @@ import platform
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,13 @@ from replay import __version__
 from replay.errors import InputError
 from replay.files import LOCK, hold_folder, read_json
 from replay.manifest import NAME, Artifact, StageManifest, check_manifest, write_manifest
+from replay.play import ADDRESS
 
 if TYPE_CHECKING:
     from replay.gates import Gate
+
+MEMBER = "member.json"
+"""File of a member's settings stage: what it overrides, and whose stages it shares."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +30,7 @@ class Workspace:
     Parameters
     ----------
     play
-        Name of the play.
+        Name of the play, or address of a member of an ensemble of it: ``demo.friction/003``.
     plays
         Folder of the plays; ``plays/<play>/play.yaml`` describes this one.
     results
@@ -42,57 +47,37 @@ class Workspace:
         return self.plays / self.play / "play.yaml"
 
     def folder(self, stage: str) -> Path:
-        """Folder of a stage."""
-        return self.results / self.play / stage
+        """Folder of a stage; a member shares some of them with its play or with other members."""
+        return self.results / self._owners.get(stage, self.play) / stage
+
+    @cached_property
+    def _owners(self) -> dict[str, str]:
+        member = self.results / self.play / "settings" / MEMBER
+        return read_json(member)["shared"] if ADDRESS.fullmatch(self.play) and member.is_file() else {}
 
 
-class Stage:
-    """One run of one stage.
+class Finished:
+    """Finished stages of a play, for one that reads their files.
 
     Parameters
     ----------
     workspace
         Where the play's files are.
-    name
-        Name of the stage: its folder.
-    after
-        The stages whose files this one may read, as far as the play's mode has them; they must have finished, and
-        their files must not have changed since.
-    keep
-        Names in the folder that survive from an unfinished run (a checkpoint).
+    stages
+        The stages, as far as the play's mode has them; their files must not have changed since.
 
     Raises
     ------
     InputError
-        When an earlier stage has not finished or one of its files changed.
+        When a stage has not finished or one of its files changed.
     """
 
-    def __init__(self, workspace: Workspace, name: str, *, after: Sequence[str] = (), keep: Sequence[str] = ()) -> None:
-        self.workspace, self.name = workspace, name
-        self.folder = workspace.folder(name)
-        self._before: dict[str, StageManifest] = {}
-        here = stages_of(workspace)
-        for stage in (name for name in after if name in here):
-            self._before[stage] = check_stage(workspace, stage)
+    def __init__(self, workspace: Workspace, stages: Sequence[str]) -> None:
+        self.workspace = workspace
+        self._before: dict[str, StageManifest] = {
+            stage: check_stage(workspace, stage) for stage in stages if stage in stages_of(workspace)
+        }
         self._inputs: dict[str, Path] = {}
-        self._artifacts: list[Artifact] = []
-        self._keep = (*keep, LOCK)
-        self._begun = False
-        self._lock()
-
-    def _begin(self) -> None:
-        """Clear the folder, manifest first; only now, so that an input that cannot be used costs no old result."""
-        if self._begun:
-            return
-        self._begun = True
-        (self.folder / NAME).unlink(missing_ok=True)
-        for path in self.folder.iterdir():
-            if path.name not in self._keep:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-
-    def _lock(self) -> None:
-        """Refuse a second writer."""
-        self._held = hold_folder(self.folder, "this stage")
 
     def follow(self, stage: str) -> None:
         """Let this stage read one more stage's files, which only an earlier one's show to be needed."""
@@ -119,7 +104,7 @@ class Stage:
             raise InputError(
                 self.workspace.folder(stage) / path,
                 f"stage {stage} made no such file",
-                mend=f"run `replay {_COMMANDS[stage]}` again",
+                mend=f"run `replay {COMMANDS[stage]}` again",
             )
         return self.read_file(f"{stage}/{path}", self.workspace.folder(stage) / path)
 
@@ -127,6 +112,55 @@ class Stage:
         """Record any other file as an input under `name`."""
         self._inputs[name] = path
         return path
+
+    def made(self, stage: str, path: str) -> bool:
+        """Whether an earlier stage made a file; a play that was stopped has fewer, one of another mode other stages."""
+        return stage in self._before and self._before[stage].artifact(path) is not None
+
+
+class Stage(Finished):
+    """One run of one stage.
+
+    Parameters
+    ----------
+    workspace
+        Where the play's files are.
+    name
+        Name of the stage: its folder.
+    after
+        The stages whose files this one may read; they must have finished, and their files must not have
+        changed since.
+    keep
+        Names in the folder that survive from an unfinished run (a checkpoint).
+
+    Raises
+    ------
+    InputError
+        When an earlier stage has not finished or one of its files changed.
+    """
+
+    def __init__(self, workspace: Workspace, name: str, *, after: Sequence[str] = (), keep: Sequence[str] = ()) -> None:
+        super().__init__(workspace, after)
+        self.name = name
+        self.folder = workspace.folder(name)
+        self._artifacts: list[Artifact] = []
+        self._keep = (*keep, LOCK)
+        self._begun = False
+        self._lock()
+
+    def _begin(self) -> None:
+        """Clear the folder, manifest first; only now, so that an input that cannot be used costs no old result."""
+        if self._begun:
+            return
+        self._begun = True
+        (self.folder / NAME).unlink(missing_ok=True)
+        for path in self.folder.iterdir():
+            if path.name not in self._keep:
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+    def _lock(self) -> None:
+        """Refuse a second writer."""
+        self._held = hold_folder(self.folder, "this stage")
 
     def write(self, path: str, meaning: str, *, unit: str = "", volatile: bool = False) -> Path:
         """Path for a file of this stage, listed in its manifest."""
@@ -137,10 +171,6 @@ class Stage:
         full = self.folder / path
         full.parent.mkdir(parents=True, exist_ok=True)
         return full
-
-    def made(self, stage: str, path: str) -> bool:
-        """Whether an earlier stage made a file; a play that was stopped has fewer, one of another mode other stages."""
-        return stage in self._before and self._before[stage].artifact(path) is not None
 
     def folder_for_many(self) -> Path:
         """The stage's folder, cleared, for a writer that names its own files; list them with `write` afterwards."""
@@ -219,11 +249,11 @@ def check_stage(workspace: Workspace, stage: str) -> StageManifest:
         return check_manifest(workspace.folder(stage))
     except InputError as error:
         raise InputError(
-            error.file, error.found, expected=error.expected, mend=f"run `replay {_COMMANDS[stage]}` again"
+            error.file, error.found, expected=error.expected, mend=f"run `replay {COMMANDS[stage]}` again"
         ) from None
 
 
-_COMMANDS = {
+COMMANDS = {
     "settings": "settings",
     "inputs": "inputs",
     "reconstruction": "reconstruct",
@@ -239,7 +269,7 @@ _COMMANDS = {
     "verdict": "judge",
     "report": "report",
 }
-STAGES = tuple(_COMMANDS)
+STAGES = tuple(COMMANDS)
 """Every stage with a manifest, in the order of the protocol."""
 _OF_COLLISIONS = ("placement",)
 

@@ -22,7 +22,7 @@ from replay.models.model import GRID_DECIMALS
 from replay.models.readiness import surrogate_inspection
 from replay.models.surrogate import SurrogatePart
 from replay.stages.foreign_deck import WEDGE, ForeignDeck, as_model, open_deck, set_numbers
-from replay.stages.verdict import told
+from replay.stages.limits import told
 from replay.tables import Column, TableFormat
 
 RENUMBERING = TableFormat(

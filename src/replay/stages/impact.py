@@ -15,10 +15,10 @@ from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
 from replay.stages.collision import collision_problem
 from replay.stages.frame import Stage, Workspace
+from replay.stages.limits import limits_of
 from replay.stages.placement import SCENE
 from replay.stages.problem import controls_of, driven_problem
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.resolved import read_settings
 
 RUN_FILES = {
     "run.json": "summary of the run",
@@ -86,7 +86,7 @@ def run_play(
         problem = driven_problem(model, driver, controls, play.solver.contact)
     files = {**RUN_FILES, **BRAIN_FILES, **PAD_FILES}
     recorders: list[Recorder] = [brain_recorder(model), pad_recorder(model)]
-    if has_damage(model):
+    if model.has_damage:
         recorders.append(damage_recorder(model))
         files |= DAMAGE_FILES
     return run_solver(stage, problem, recorders, files, threads=threads)
@@ -105,7 +105,7 @@ def run_solver(
     """Run a problem in the stage's folder and list its files; a run that stops itself ends the play."""
     if problem.contact is not None:
         files = files | CONTACT_FILES
-    if problem.straps:
+    if any(strap.recorded for strap in problem.straps):
         files = files | STRAP_FILES
     folder = stage.write_all(files)
     try:
@@ -129,11 +129,6 @@ def pad_recorder(model: Model) -> PadRecorder:
     roles = ("comfort_pad", "energy_pad", "chin_cup")
     pads = {p.name: np.flatnonzero(model.element_part == k) for k, p in enumerate(model.parts) if p.role in roles}
     return PadRecorder(pads)
-
-
-def has_damage(model: Model) -> bool:
-    """Whether the brain's law keeps the damage variable."""
-    return model.materials["brain"]["law"] == "brain_isv"
 
 
 def damage_recorder(model: Model) -> DamageRecorder:

@@ -22,6 +22,7 @@ from replay.laboratory import (
     answer,
     calibrate,
     curve_answer,
+    left_out,
     programme,
     read_tests,
     rms,
@@ -85,6 +86,7 @@ def run_calibration(data: Path, out: Path, *, modes: str, hold: Sequence[str], s
         Free(name, *f["bounds"]) for name, f in facts.items() if f["certainty"] == "calibrated" and name not in hold
     ]
     fit = calibrate(material, free, used, starts=starts, seed=seed)
+    foretold = left_out(fit.material, free, used)
     pictures = article_figures(fit.material, curves)
     write_json(
         out / "calibration.json",
@@ -93,6 +95,7 @@ def run_calibration(data: Path, out: Path, *, modes: str, hold: Sequence[str], s
             "fitted_to": [curve.name for curve in used],
             "values": dict(fit.material.parameters),
             "rms_Pa": rms(fit.material, curves),
+            "rms_when_left_out_Pa": foretold,
             "cost": fit.cost,
             "costs_of_all_starts": fit.costs,
             "on_a_bound": fit.on_a_bound(),
@@ -103,10 +106,15 @@ def run_calibration(data: Path, out: Path, *, modes: str, hold: Sequence[str], s
     )
     write_pictures(out, pictures)
     write_page(
-        out / "calibration.html", f"Calibration to {data.name}", _words(fit, used), pictures, _tables(fit, curves)
+        out / "calibration.html",
+        f"Calibration to {data.name}",
+        _words(fit, used),
+        pictures,
+        _tables(fit, curves, foretold),
     )
     for name, error in rms(fit.material, curves).items():
-        print(f"  {name}: RMS {1e-3 * error:.3f} kPa")
+        unseen = f", {1e-3 * foretold[name]:.3f} under a fit to the others" if name in foretold else ""
+        print(f"  {name}: RMS {1e-3 * error:.3f} kPa{unseen}")
     print(f"{out / 'calibration.html'}: cost {fit.cost:.4g}, on a bound: {', '.join(fit.on_a_bound()) or 'none'}")
     return 0
 
@@ -188,7 +196,9 @@ def _words(fit: Fit, used: Sequence[Curve]) -> list[str]:
     return words
 
 
-def _tables(fit: Fit, curves: Sequence[Curve]) -> list[tuple[str, list[str], list[list[Any]]]]:
+def _tables(
+    fit: Fit, curves: Sequence[Curve], foretold: Mapping[str, float]
+) -> list[tuple[str, list[str], list[list[Any]]]]:
     errors: Mapping[str, float] = rms(fit.material, curves)
     status = {curve.name: ", ".join(dict.fromkeys(curve.statuses)) for curve in curves}
     names = [f.name for f in fit.free]
@@ -198,7 +208,10 @@ def _tables(fit: Fit, curves: Sequence[Curve]) -> list[tuple[str, list[str], lis
     ]
     points = len(profile[0]) // 2 if profile else 0
     return [
-        ("Errors", ["Test", "RMS (kPa)", "data"], [[n, 1e-3 * e, status[n]] for n, e in errors.items()]),
+        (
+            "Errors", ["Test", "RMS (kPa)", "under a fit to the other tests (kPa)", "data"],
+            [[n, 1e-3 * e, 1e-3 * foretold[n] if n in foretold else "", status[n]] for n, e in errors.items()],
+        ),
         (
             "Parameters", ["Parameter", "value", "lower bound", "upper bound", "standard error of its logarithm"],
             [[f.name, fit.value(f.name), f.least, f.most, float(s)] for f, s in zip(fit.free, fit.spread)],

@@ -24,8 +24,8 @@ from replay.motion import Kinematics
 from replay.stages.fidelity import skull_motion
 from replay.stages.forces import forces
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import has_damage, replayed_model
-from replay.stages.verdict import limits_of
+from replay.stages.impact import replayed_model
+from replay.stages.limits import limits_of
 
 _DRIVEN = "a driven head has no impactor: the crossover is that of head and helmet"
 _COLLISION = "the impactor is all of the striking player; the crossover is that of the struck head and the impactor"
@@ -57,7 +57,7 @@ def run(workspace: Workspace) -> str | None:
         impactor,
     )
     damage = None
-    if has_damage(model):
+    if model.has_damage:
         found = pd.read_csv(stage.read("replay", "brain_damage.csv"))
         found["head_J_s"] = np.interp(found["time_s"], time, head)
         path = stage.write("damage_volume.csv", "damaged volume by region against time and action", unit="m^3")

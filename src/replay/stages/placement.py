@@ -18,10 +18,10 @@ from replay.play import Collision
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.collision import scene_at_rest
 from replay.stages.frame import Stage, Workspace
+from replay.stages.limits import limits_of
 from replay.stages.players import ROLES, PlayerStart
 from replay.stages.problem import controls_of, part_numbers
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.resolved import read_settings
 
 SCENE = "scene.h5"
 MODELS = {"struck": "model.h5", "impactor": "impactor.h5"}

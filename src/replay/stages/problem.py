@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from replay import models
 from replay.models import Model, select_assembly
 from replay.motion import Kinematics
 from replay.play import Contact, Play
@@ -116,6 +117,17 @@ def chin_straps(model: Model, player: int = 1) -> tuple[tuple[RigidSet, ...], tu
     return shell, tuple(straps)
 
 
+def membrane_cables(model: Model) -> tuple[Strap, ...]:
+    """Falx and tentorium of a model that has them, cable by cable."""
+    if model.info.get("membranes", "none") == "none":
+        return ()
+    return tuple(
+        Strap(f"{name}_{k}", ends.astype(np.int64), stiffness, recorded=False)
+        for name, net in (("falx", models.falx(model)), ("tentorium", models.tentorium(model)))
+        for k, (ends, stiffness) in enumerate(zip(net.nodes, net.stiffness_n_per_m.tolist()))
+    )
+
+
 def body_links(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Joint, ...]]:
     """Node sets that move as bodies, and joints, of a model with a body; none of a bare head."""
     sets = tuple(RigidSet(name, model.node_sets[name].astype(np.int64)) for name in model.rigid_node_sets)
@@ -174,7 +186,7 @@ def driven_problem(model: Model, driver: Kinematics, controls: Controls, contact
         element_ids=model.element_ids,
         rigid_sets=(*shell, *bodies),
         joints=joints,
-        straps=straps,
+        straps=(*straps, *membrane_cables(model)),
         contact=contact_of(model, contact),
     )
 

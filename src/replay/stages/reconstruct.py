@@ -8,8 +8,8 @@ from replay.files import write_json
 from replay.gates import video_reconstruction_gate, wearable_reconstruction_gate
 from replay.motion import reconstruct
 from replay.stages.frame import Stage, Workspace
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.limits import limits_of
+from replay.stages.resolved import read_settings
 
 _MEANINGS = {
     "kinematics.csv": "motion of the skull's centre of gravity; from clicks, both modes with bands",

@@ -146,7 +146,7 @@ def _plan(run: SealedRun, into: Path, environment: Path | None, cores: int | Non
         raise InputError(
             environment, "is no Python environment: it has no bin/python", mend="name a virtual environment"
         )
-    config = ["plays_folder=../plays", *([f"resolution={resolution}"] if resolution else [])]
+    config = ["plays_folder=../plays", "table=", *([f"resolution={resolution}"] if resolution else [])]
     target = f"results/{play}/bundle/{play}.zip"
     command = (str(python), "-m", "snakemake", target, "--cores", str(cores or "all"), "--config", *config)
     return Plan(play, root, python.parents[1], prepare, command, root / target)

@@ -11,7 +11,7 @@ from replay.gates import hourglass_sensitivity_gate
 from replay.measures import regional_summary
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import BEFORE_A_RUN, UNFINISHED, run_play
-from replay.stages.verdict import limits_of
+from replay.stages.limits import limits_of
 
 _FACTOR = 0.5
 

@@ -10,9 +10,9 @@ from replay.measures import ShakeRecorder, shake_measures
 from replay.models import read_model
 from replay.stages.frame import Stage, Workspace
 from replay.stages.impact import RUN_FILES, UNFINISHED, run_solver
+from replay.stages.limits import limits_of
 from replay.stages.problem import controls_of, helmet_problem
-from replay.stages.settings import read_settings
-from replay.stages.verdict import limits_of
+from replay.stages.resolved import read_settings
 
 
 def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 10.0) -> str | None:

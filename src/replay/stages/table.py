@@ -18,7 +18,8 @@ from replay.tables import Column, TableFormat
 UNREADABLE = "UNREADABLE"
 
 
-def _maybe(name: str, meaning: str, kind: str = "float") -> Column:
+def maybe(name: str, meaning: str, kind: str = "float") -> Column:
+    """A column whose cell is empty where the play did not come so far."""
     return Column(name, meaning, kind=kind, may_be_empty=True)  # type: ignore[arg-type]
 
 
@@ -26,29 +27,29 @@ PLAYS = TableFormat(
     "table of plays",
     (
         Column("bundle", "file or folder that was read", kind="text"),
-        _maybe("play", "name of the play", "text"),
+        maybe("play", "name of the play", "text"),
         Column("verdict", f"as sealed, or {UNREADABLE}", kind="text"),
-        _maybe("reason", "what failed, stopped the play, or is wrong with the bundle", "text"),
-        _maybe("source", "clicks or wearable", "text"),
-        _maybe("resolution", "of the model", "text"),
-        _maybe("rate_hz", "of the footage or sensor [Hz]"),
-        _maybe("t0_s", "impact reference on the play's own clock [s]"),
-        _maybe("target_acceleration_m_per_s2", "peak resultant CG acceleration of the reconstruction [m/s^2]"),
-        _maybe("target_omega_rad_per_s", "peak resultant angular velocity of the reconstruction [rad/s]"),
-        _maybe("target_alpha_rad_per_s2", "peak resultant angular acceleration of the reconstruction [rad/s^2]"),
-        _maybe("omega_over_noise", "that angular velocity over the peak that noise alone shows"),
-        _maybe("hic15", "HIC15 of the replayed head"),
-        _maybe("bric", "BrIC of the replayed head"),
-        _maybe(
+        maybe("reason", "what failed, stopped the play, or is wrong with the bundle", "text"),
+        maybe("source", "clicks or wearable", "text"),
+        maybe("resolution", "of the model", "text"),
+        maybe("rate_hz", "of the footage or sensor [Hz]"),
+        maybe("t0_s", "impact reference on the play's own clock [s]"),
+        maybe("target_acceleration_m_per_s2", "peak resultant CG acceleration of the reconstruction [m/s^2]"),
+        maybe("target_omega_rad_per_s", "peak resultant angular velocity of the reconstruction [rad/s]"),
+        maybe("target_alpha_rad_per_s2", "peak resultant angular acceleration of the reconstruction [rad/s^2]"),
+        maybe("omega_over_noise", "that angular velocity over the peak that noise alone shows"),
+        maybe("hic15", "HIC15 of the replayed head"),
+        maybe("bric", "BrIC of the replayed head"),
+        maybe(
             "brain_strain_p95", "95th percentile of maximum principal strain (Green-Lagrange) in the brain, at its peak"
         ),
-        _maybe("rmse_acceleration_percent", "driver fidelity: RMSE of linear acceleration over its peak [%]"),
-        _maybe("energy_ratio_min", "least ratio of the energy ledger"),
-        _maybe("energy_ratio_max", "greatest ratio of the energy ledger"),
-        _maybe("not_checked", "checks without power"),
-        _maybe("loosened", "limits that the play loosened"),
-        _maybe("version", "of replay", "text"),
-        _maybe("commit", "of the source, + where it had changes", "text"),
+        maybe("rmse_acceleration_percent", "driver fidelity: RMSE of linear acceleration over its peak [%]"),
+        maybe("energy_ratio_min", "least ratio of the energy ledger"),
+        maybe("energy_ratio_max", "greatest ratio of the energy ledger"),
+        maybe("not_checked", "checks without power"),
+        maybe("loosened", "limits that the play loosened"),
+        maybe("version", "of replay", "text"),
+        maybe("commit", "of the source, + where it had changes", "text"),
     ),
 )
 """Format of the CSV table of `replay table`."""
@@ -69,7 +70,7 @@ def table(bundles: Sequence[Path], out: Path) -> int:
     int
         0, or 1 when a bundle could not be read.
     """
-    rows = [_row(path) for path in bundles]
+    rows = [row_of(path) for path in bundles]
     columns = {column.name: [row.get(column.name, _empty(column)) for row in rows] for column in PLAYS.columns}
     PLAYS.write(out.with_name(out.name + ".csv"), columns)
     write_text(out.with_name(out.name + ".html"), overview_page(rows))
@@ -84,7 +85,8 @@ def _empty(column: Column) -> Any:
     return "" if column.kind == "text" else np.nan
 
 
-def _row(path: Path) -> dict[str, Any]:
+def row_of(path: Path) -> dict[str, Any]:
+    """What a bundle says of its play, by the columns of `PLAYS`; what it lacks is absent."""
     try:
         with foreign_content(path), open_run(path) as run:
             found = {"bundle": path.as_posix(), **_verdict(run), **_numbers(run)}

@@ -31,6 +31,7 @@ from replay.motion.synthetic import (
 from replay.motion.synthetic.headform import headform_record
 from replay.motion.tracking import Following
 from replay.play import load_play, play_schema_text
+from replay.stages.player import add_body
 from replay.stages.verdict import ALL_GATE_FILES
 
 _COLOURS = {"pass": "32", "warn": "33", "fail": "31", "not reached": "90"}
@@ -172,13 +173,36 @@ def digitise_video(
 
 
 def write_model_file(
-    preset: str, resolution: str, pieces: Sequence[str | None], out: Path, preview: Path | None
+    preset: str,
+    resolution: str,
+    pieces: Sequence[str | None],
+    out: Path,
+    preview: Path | None,
+    body: dict[str, Any] | None = None,
 ) -> int:
-    """Build a model by itself, print its tables and write it; files of its helmet's pieces are found from here."""
+    """Build a model by itself, print its tables and write it.
+
+    Parameters
+    ----------
+    preset, resolution
+        Of `replay.models.build_model`.
+    pieces
+        Helmet, facemask, pads and chin strap, by name or YAML file found from here; None for the helmet's own.
+    out, preview
+        Files to write.
+    body
+        ``posture``, and fields of `replay.models.BodyPlan`; none for a head and helmet alone.
+    """
     helmet, *others = pieces
     model = models.build_model(preset, resolution, design=models.load_design(helmet or "classic", *others))
+    if body is not None:
+        facts = dict(body)
+        model = add_body(model, facts.pop("posture"), models.BodyPlan(**facts))
     models.write_model(out, model)
     print(models.summary_text(model))
+    print(models.comparison_text(model))
+    if body is not None:
+        print("\n" + models.segments_text(model))
     if preview is not None:
         models.write_preview(preview, model)
     return 0

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from replay.bundle import package_facts
 from replay.files import write_json
-from replay.gates import Gate, Limits, PlayVerdict, package_gate, play_verdict, read_gate
+from replay.gates import Gate, PlayVerdict, package_gate, play_verdict, read_gate
 from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
 from replay.stages.frame import STAGES, Stage, Workspace
-from replay.stages.settings import read_settings
+from replay.stages.limits import limits_of
+from replay.stages.resolved import read_settings
 
 GATE_FILES = {
     "reconstruction": ("gate.json",),
@@ -24,26 +23,6 @@ GATE_FILES = {
 }
 ALL_GATE_FILES = {**GATE_FILES, "verdict": ("gate.json",)}
 """With the package gate, which the verdict stage judges itself."""
-
-
-def limits_of(stage: Stage) -> Limits:
-    """Limits in force for the play: the shipped ones, with the play's own where it sets some.
-
-    The tolerances of the physical helmet are settings of the play of their own (``helmet.mass_tolerance_kg``).
-    """
-    play = read_settings(stage)
-    tolerances = {
-        "assembly.helmet_mass_difference_kg": play.helmet.mass_tolerance_kg,
-        "assembly.helmet_cg_difference_m": play.helmet.cg_tolerance_m,
-        "helmet.cg_offset_m": play.helmet.cg_tolerance_m,
-    }
-    return Limits.load({**tolerances, **play.gates}, mode=play.mode)
-
-
-def told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:
-    """Entries that a gate's checks name, with their details; a detail that says nothing is left out."""
-    named = {name: facts[name] for name in checks}
-    return named | {f"{name}_detail": facts[f"{name}_detail"] for name in checks if facts.get(f"{name}_detail")}
 
 
 def collect(stage: Stage) -> list[Gate]:

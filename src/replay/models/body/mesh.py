@@ -12,18 +12,18 @@ from replay.models.body.fit import Skin, fit_to_skin
 from replay.models.body.posture import PosedBody, body_joints
 from replay.models.body.segments import HEAD, MESHED, SEGMENTS, kind_of
 from replay.models.body.shape import Shape
-from replay.models.body.voxels import Grid, filled_share, parted_mesh
+from replay.models.body.voxels import KEPT_SHARE, Grid, filled_share, parted_mesh
 from replay.models.radial import RadialSurface
 
 #: Edge of a voxel at each resolution [m].
 STEPS_M = {"tiny": 0.040, "coarse": 0.030, "medium": 0.025, "fine": 0.020}
+#: Coarser, a limb has no inside; finer, the build takes minutes and the run no more than before.
+STEP_RANGE_M = (0.015, 0.045)
 LEAST_QUALITY = 0.30
 #: Radius about the joint within which a limb is grown to its parent, over the radius of the flesh there [m].
 _GROWN_M = {
     "upper_arm": 0.13, "forearm": 0.09, "hand": 0.07, "thigh": 0.17, "shank": 0.11, "foot": 0.10, "neck": 0.16,
 }  # fmt: skip
-#: Cells whose centre lies within this of a bone's line are kept however thin the limb is there, over the step.
-_SPINE = 0.9
 #: Where cells next to bones of the limbs are bone [m]; a bone is never thinner than one cell.
 _BONE_RADIUS_M = 0.020
 #: What rises from the trunk about the neck's line within this belongs to the neck [m].
@@ -75,7 +75,7 @@ class BodyMesh:
     bone
         Whether a hex belongs to its segment's bone, (m,) bool.
     skull_nodes
-        Nodes that the skull carries, (k,).
+        Nodes that the skull carries, (k,); none where the neck ends at its joint.
     """
 
     nodes: np.ndarray
@@ -97,12 +97,13 @@ def body_mesh(shape: Shape, posed: PosedBody, step_m: float, room: HeadRoom, tis
     room
         What the head takes.
     tissue
-        ``rigid``: a bone fills its segment but for the cells at joints; ``deformable``: bones are as thin as bones.
+        ``rigid``: each segment is bone through and through and has nodes of its own; ``deformable``: thin bones in
+        flesh that goes on over the joints.
     """
     skin = Skin.sampled(posed.skin, shape.triangles, shape.weights.argmax(axis=1))
     grid = Grid.around(posed.skin, step_m)
     share = filled_share(grid, posed.skin, shape.triangles)
-    cells = np.argwhere((share > 0.5) | _along_bones(grid, posed))
+    cells = np.argwhere((share > KEPT_SHARE) | _along_bones(grid, posed))
     centre = grid.centres(cells)
     _, near = cKDTree(skin.points).query(centre)
     segment = skin.label[near]
@@ -116,10 +117,13 @@ def body_mesh(shape: Shape, posed: PosedBody, step_m: float, room: HeadRoom, tis
     nodes, hexes = nodes[used], row.reshape(-1, 8)
     segment = np.array([MESHED.index(SEGMENTS[k]) for k in segment[kept].tolist()])
     place, boundary = fit_to_skin(nodes, hexes, _with_head(skin, room), step_m, least_quality=LEAST_QUALITY)
+    if tissue == "rigid":
+        own, row = np.unique(hexes.ravel() * len(MESHED) + np.repeat(segment, 8), return_inverse=True)
+        rigid = np.ones(len(hexes), dtype=bool)
+        return BodyMesh(place[own // len(MESHED)], row.reshape(-1, 8), segment, rigid, np.zeros(0, dtype=int))
     skull = boundary[np.isin(boundary, hexes[segment == MESHED.index("neck")])]
     skull = skull[room.gap_m(place[skull]) < 0.45 * step_m]
-    bone = _bones(place, hexes, segment, posed, skull, tissue)
-    return BodyMesh(place, hexes, segment, bone, skull)
+    return BodyMesh(place, hexes, segment, _bones(place, hexes, segment, posed, skull), skull)
 
 
 def _along_bones(grid: Grid, posed: PosedBody) -> np.ndarray:
@@ -217,12 +221,11 @@ class _Growth:
 
 
 def _bones(
-    nodes: np.ndarray, hexes: np.ndarray, segment: np.ndarray, posed: PosedBody, skull: np.ndarray, tissue: str
+    nodes: np.ndarray, hexes: np.ndarray, segment: np.ndarray, posed: PosedBody, skull: np.ndarray
 ) -> np.ndarray:
-    """Hexes of bone: a segment's whole length, but no node of another bone.
+    """Hexes along the bones' lines, none of which has a node of another bone.
 
-    Whoever chooses first takes what touches its neighbours, and leaves them a layer of flesh at the joint: hands and
-    feet, so that they are not left without, then from the trunk outwards. Only the neck keeps a layer at both ends.
+    Neck, hands and feet choose first, so that they are not left without; then all from the trunk outwards.
     """
     centre = nodes[hexes].mean(axis=1)
     owner = np.full(len(nodes), -1)
@@ -234,12 +237,10 @@ def _bones(
         own = np.flatnonzero(segment == k)
         if not len(own):
             continue
-        distance, _ = cKDTree(_dense(posed.ends[name], 0.004)).query(centre[own])
         free = np.isin(owner[hexes[own]], [-1, k]).all(axis=1)
-        chosen = free if tissue == "rigid" else free & (distance <= _BONE_RADIUS_M)
-        if name == "neck":
-            chosen = chosen & ~np.isin(hexes[own], hexes[segment != k]).any(axis=1)
-        if free.any() and not chosen.any():  # a limb thinner than its voxels, a neck of three layers: its middle alone
+        distance, _ = cKDTree(_dense(posed.ends[name], 0.004)).query(centre[own])
+        chosen = free & (distance <= _BONE_RADIUS_M)
+        if free.any() and not chosen.any():  # no voxel lies that near: the middle one
             away = np.sqrt(np.sum((centre[own] - posed.ends[name].mean(axis=0)) ** 2, axis=1))
             chosen = free & (away <= away[free].min() + 1e-9)
         bone[own[chosen]] = True

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.models.body.mesh import STEPS_M, BodyMesh, HeadRoom, body_mesh
+from replay.models.body.mesh import STEP_RANGE_M, STEPS_M, BodyMesh, HeadRoom, body_mesh
 from replay.models.body.posture import BodyJoint, PosedBody, Posture, body_joints, named_posture, pose
 from replay.models.body.segments import HEAD, MESHED, de_leva_masses_kg, target_masses_kg
 from replay.models.body.shape import load_body, shape_of
@@ -25,6 +25,10 @@ BONE_PIDS, FLESH_PIDS = 60_000_100, 60_000_200
 _FIRST_NUMBER = 65_000_000
 SKULL_SET = "skull_base"
 TISSUES = ("rigid", "deformable")
+NOTES = {
+    "rigid": "the body's segments are rigid and held by joints alone; decks do not carry the joints",
+    "deformable": "the body is flesh about thin rigid bones, held by joints; decks do not carry the joints",
+}
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class BodyPlan:
     posture
         Name of one of ``data/body.yaml``, or joint angles.
     tissue
-        ``rigid``: each segment moves as one but for the flesh at its joints; ``deformable``: flesh about thin bones.
+        ``rigid``: each segment is one rigid body and joints hold them; ``deformable``: flesh about thin bones.
     step_m
         Edge of a voxel [m]; that of the head's resolution where None.
     """
@@ -66,9 +70,9 @@ def with_body(model: Model, plan: BodyPlan = BodyPlan()) -> Model:
     Returns
     -------
     Model
-        In the same frame, the head and helmet unchanged in it: parts ``bone_<segment>`` and ``flesh_<segment>`` of the
-        assembly ``body``, `joints`, and the node set ``skull_base`` of the neck's end, which moves with the skull.
-        ``info["body"]`` has the plan, the table of segments and the axes of every segment.
+        In the same frame, the head and helmet unchanged in it: parts ``bone_<segment>`` of the assembly ``body`` and
+        `joints`; if deformable ``flesh_<segment>`` too, and the node set ``skull_base`` of the neck's end, which moves
+        with the skull. ``info["body"]`` has the plan, the table of segments and the axes of every segment.
 
     Raises
     ------
@@ -85,6 +89,9 @@ def with_body(model: Model, plan: BodyPlan = BodyPlan()) -> Model:
     shape = shape_of(plan.stature_m, plan.mass_kg, plan.muscle)
     posed = pose(shape, posture)
     step = STEPS_M[model.info["resolution"]] if plan.step_m is None else plan.step_m
+    if not STEP_RANGE_M[0] <= step <= STEP_RANGE_M[1]:
+        message = f"voxels of {step:g} m; between {STEP_RANGE_M[0]:g} and {STEP_RANGE_M[1]:g} m is possible"
+        raise ValueError(message)
     seat = _Seat.of(model, posed)
     mesh = body_mesh(shape, posed, step, seat.room(model), plan.tissue)
     missing = [name for k, name in enumerate(MESHED) if not mesh.bone[mesh.segment == k].any()]
@@ -203,17 +210,19 @@ def _merged(
             element_part[own] = len(parts)
             parts.append(Part(first + k + 1, name, role, "body", name))
             facts = data[role]
-            soft = role == "flesh" and (body["tissue"] == "rigid" or segment == "neck")
+            soft = role == "flesh" and segment == "neck"
             materials[name] = {
                 "law": facts["law"],
                 "density_kg_per_m3": density[segment],
-                "parameters": dict(facts["joint_parameters" if soft else "parameters"]),
+                "parameters": dict(facts["neck_parameters" if soft else "parameters"]),
                 "certainty": dict(facts["certainty"]),
                 "source": facts["source"],
             }
     order = np.argsort(element_part, kind="stable")
     skull_nodes = np.unique(model.hexes[model.element_part == [p.pid for p in model.parts].index(skull_pid)])
     lowest = skull_nodes[np.argmin(model.nodes[skull_nodes, 2])]
+    neck_end = np.concatenate([[lowest], mesh.skull_nodes + len(model.nodes)]).astype(np.int32)
+    carried = {SKULL_SET: neck_end} if len(mesh.skull_nodes) else {}
     pids = tuple(part.pid for part in parts if part.assembly == "body")
     everyone = tuple(sorted({*model.part_sets.get("all_parts", ()), *pids}))
     return replace(
@@ -228,11 +237,8 @@ def _merged(
         part_sets={**model.part_sets, "all_parts": everyone, "body_1": pids},
         part_set_ids={**model.part_set_ids, "body_1": 60_000_097},
         materials=materials,
-        node_sets={
-            **model.node_sets,
-            SKULL_SET: np.concatenate([[lowest], mesh.skull_nodes + len(model.nodes)]).astype(np.int32),
-        },
+        node_sets={**model.node_sets, **carried},
         joints=joints,
-        rigid_node_sets=(SKULL_SET,),
-        info={**model.info, "body": body},
+        rigid_node_sets=tuple(carried),
+        info={**model.info, "body": body, "notes": [*model.info["notes"], NOTES[body["tissue"]]]},
     )

@@ -16,8 +16,8 @@ from scipy.sparse.csgraph import connected_components
 
 from replay.models.cubed_sphere import HEX_CORNERS
 
-#: Samples along an edge of a cell, and their share inside from which a cell is kept.
-_SAMPLES, _KEPT_SHARE = 3, 0.5
+#: Samples along an edge of a cell, and their share inside above which a cell is kept.
+_SAMPLES, KEPT_SHARE = 3, 0.5
 _CORNERS = ((HEX_CORNERS + 1) // 2).astype(np.int64)
 
 

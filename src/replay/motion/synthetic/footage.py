@@ -34,6 +34,8 @@ HEAD_SIZED_OFFSET_M = (0.010, 0.0, 0.030)
 ARTICLE_OFFSET_M = (-0.1, 0.4, 0.0)
 """helmet_to_com as the article prints it [m]."""
 
+_FEWEST_SEEN = 3
+
 
 @dataclass(frozen=True)
 class SyntheticCamera:
@@ -132,7 +134,8 @@ class Flaws:
     outlier_share, outlier_px
         Share of clicks that are wild, and their standard deviation [px].
     occluded_share, occlusion_frames
-        Share of clicks that are hidden, in runs of so many frames.
+        Share of clicks that are hidden, in runs of so many frames; a run that would leave fewer than three
+        landmarks in a frame is not hidden.
     hide_the_far_side
         Whether landmarks that face away from the camera are hidden.
     """
@@ -288,7 +291,10 @@ def _occluded(rng: np.random.Generator, shape: tuple[int, int], flaws: Flaws) ->
     runs = round(flaws.occluded_share * frames * landmarks / flaws.occlusion_frames)
     for _ in range(runs):
         begin, which = int(rng.integers(frames)), int(rng.integers(landmarks))
-        hidden[begin : begin + flaws.occlusion_frames, which] = True
+        tried = hidden.copy()
+        tried[begin : begin + flaws.occlusion_frames, which] = True
+        if (~tried).sum(axis=1).min() >= _FEWEST_SEEN:
+            hidden = tried
     return hidden
 
 

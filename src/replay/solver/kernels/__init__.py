@@ -1,5 +1,5 @@
 """The compiled physics of the solver; see `device` for how, `lanes` for the element loop."""
 
-from replay.solver.kernels.device import source_hash
+from replay.solver.kernels.cache import source_hash
 
 __all__ = ["source_hash"]

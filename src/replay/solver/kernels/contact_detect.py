@@ -26,6 +26,8 @@ _FAR = 1e300
 _TIE = 1e-3
 # a point this share of a face's size behind a face that never held it still counts as touching
 _TOUCH = 1e-3
+# cosine between a point's inward normal and that of a face, below which the point glides past it
+_FLUSH = 0.1
 # cosine between normals of faces that hold a point the same way
 _ALIKE = 0.9
 
@@ -148,21 +150,28 @@ def _look(nodal, mesh, point, p, first, candidate, reach, hits):
         hits.distance[k] = far
         hits.along[k] = along
         hits.size[k] = size
-        hits.facing[k] = -dot(own, n)
         hits.u[k] = u
         hits.v[k] = v
         hits.over[k] = (abs(u) < 1.0 and abs(v) < 1.0) or dot(aside, aside) <= (1e-6 * size) * (1e-6 * size)
+        # beside a face it is the rim that looks at the point
+        hits.facing[k] = -dot(own, n if hits.over[k] else scale((1.0 if along >= 0.0 else -1.0) / far, d))
     return near
 
 
 def _better(k, best, hits):
-    """Whether hit `k` is nearer than hit `best`; of equals the one that looks at the point, then the first."""
+    """Whether hit `k` is nearer than hit `best`.
+
+    Of equals it is a face that the point is over, not one whose rim the same point lies beside; then the one that
+    looks at the point, then the first.
+    """
     tie = _TIE * min(hits.size[k], hits.size[best])
     if hits.distance[k] < hits.distance[best] - tie:
         return True
     if hits.distance[k] > hits.distance[best] + tie:
         return False
-    if min(hits.distance[k], hits.distance[best]) > tie:
+    if hits.over[k] != hits.over[best]:
+        return hits.over[k]
+    if not hits.over[k]:
         # one edge or corner seen by two faces: the one that is more in front of it, or behind
         return abs(hits.along[k]) / hits.distance[k] > abs(hits.along[best]) / hits.distance[best] + 1e-9
     return hits.facing[k] > hits.facing[best] + 1e-9
@@ -220,8 +229,13 @@ def _inside(nodal, mesh, point, p, first, candidate, old, hits, slots):
 
 
 def _outside(nodal, mesh, point, p, first, candidate, old, held, hits, slots):
-    """Add faces that the point is in front of, nearest first; return how many are held in all."""
+    """Add faces that the point is in front of, nearest first; return how many hold it in all.
+
+    A point that nothing holds and that glides past a side or a rim keeps that face in mind: it may be behind its
+    neighbour next.
+    """
     remembered = old[point, 0] >= 0
+    glides = False
     while held < SLOTS:
         best = -1
         for k in range(first[point], first[point + 1]):
@@ -238,11 +252,12 @@ def _outside(nodal, mesh, point, p, first, candidate, old, held, hits, slots):
         facing = hits.facing[best]
         if mesh.body[face] == mesh.point_body[point] and facing <= 0.0:
             continue
-        before = False
-        for slot in range(SLOTS):
-            before = before or old[point, slot] == face
-        # a flush side is not what the point runs against
-        if not before and (facing < -0.3 or (facing < 0.1 and far < _TIE * size)):
+        # a side, or a rim, that lies flush is not what the point runs against
+        if facing < _FLUSH:
+            if held == 0 and not glides and mesh.body[face] != mesh.point_body[point]:
+                glides = True
+                hold(nodal, mesh, point, 0, p, face, best, hits, slots)
+                slots.gap[point, 0] = far
             continue
         hits.distance[best] = far
         hold(nodal, mesh, point, held, p, face, best, hits, slots)
@@ -256,7 +271,7 @@ def _outside(nodal, mesh, point, p, first, candidate, old, held, hits, slots):
             hidden = hidden or alike > _ALIKE or beside or slots.face[point, other] == face
         if not hidden:
             held += 1
-    for slot in range(held, SLOTS):
+    for slot in range(max(held, 1 if glides else 0), SLOTS):
         slots.face[point, slot] = -1
     return held
 

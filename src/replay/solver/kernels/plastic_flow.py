@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from replay.solver.kernels.device import device
 from replay.solver.kernels.mathx import exp, log, select, sinh
-from replay.solver.kernels.tensors import contract, trace
+from replay.solver.kernels.tensors import contract, deviator, trace
 
 #: Largest square of the chain stretch over its locking stretch: beyond, the network hardens linearly.
 LOCKED = 0.9
@@ -58,8 +58,11 @@ class Flow(NamedTuple):
 
 @device
 def moments(n, n2, s):
-    """``tr S``, ``N:S``, ``N^2:S``."""
-    return trace(s), contract(n, s), contract(n2, s)
+    """``tr S``, ``N:S``, ``N^2:S``; the second by the deviator, for N has no trace but that of its rounding.
+
+    Near rest S is nearly I and N the direction of what is left of it, and ``N:I`` would be the greater part.
+    """
+    return trace(s), contract(n, deviator(s)), contract(n2, s)
 
 
 @device

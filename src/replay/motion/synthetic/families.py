@@ -1,13 +1,12 @@
-"""Random head impacts with a known truth, in families: some to calibrate bands on, others to test them on.
+"""Random head impacts in families: some to build the estimator and its bands with, others to test them on.
 
-Every motion is a sum of pulses of angular and linear acceleration on a slow background, integrated on a fine grid.
-What differs between families is the shape of the pulses and how the axis moves; sizes and durations are drawn from
-the same ranges (those that the literature on football impacts spans) for all.
+Where `Impact` is one pulse in closed form, these are sums of pulses about several axes on a slow background, integrated
+on a fine grid. What differs between families is the shape of the pulses and how the axis moves; sizes and durations
+are drawn from the same ranges (those that the literature on football impacts spans) for all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,11 +16,12 @@ from scipy.spatial.transform import Rotation
 
 from replay.motion.kinematics import STANDARD_GRAVITY, Kinematics
 from replay.motion.rates import integrate_rotation
+from replay.motion.synthetic.pulses import PULSES, Pulse, pulse
 from replay.tables import Column, TableFormat
 
 STEP_S = 5.0e-4
-BUILDING = ("sine_squared", "skewed", "double")
-"""Families that shaped the estimator and its bands."""
+BUILDING = ("sine_squared", "skewed", "two_blows", "many_lobes")
+"""Families that shaped the bands; the first three also the estimator."""
 TESTING = ("half_sine", "wobbling", "mouthguard")
 """Families that had no part in building: bands are judged on these alone."""
 
@@ -37,7 +37,7 @@ MOUTHGUARD = TableFormat(
 
 
 @dataclass(frozen=True)
-class Truth:
+class GriddedMotion:
     """A motion on a fine grid, to be asked at any time; time 0 is near the impact.
 
     Parameters
@@ -78,7 +78,7 @@ def draw(
     *,
     records: Path | None = None,
     quiet: bool = False,
-) -> Truth:
+) -> GriddedMotion:
     """One motion of a family.
 
     Parameters
@@ -119,7 +119,7 @@ def draw(
     position = np.cumsum(velocity, axis=0) * STEP_S
     position += position_m - position[zero]
     alpha = np.gradient(spin, STEP_S, axis=0)
-    return Truth(Kinematics(t, position, rotation, velocity, a, spin, alpha))
+    return GriddedMotion(Kinematics(t, position, rotation, velocity, a, spin, alpha))
 
 
 def _slow(rng: np.random.Generator, t: np.ndarray, size: float, *, derivative: bool = False) -> np.ndarray:
@@ -167,70 +167,80 @@ def _sizes(rng: np.random.Generator, least_arrest_s: float = 0.040) -> _Sizes:
     )
 
 
-Pulse = Callable[[np.ndarray], np.ndarray]
+def _rise(family: Pulse, t: np.ndarray, begin: float, duration: float) -> np.ndarray:
+    """Integral of a pulse, from 0 to 1."""
+    return pulse(family, t, begin, duration, 1.0)[1] / (duration * _area(family))
 
 
-def _unit(pulse: np.ndarray) -> np.ndarray:
+def _unit(family: Pulse, t: np.ndarray, begin: float, duration: float) -> np.ndarray:
     """Pulse of unit area."""
-    return pulse / max(float(pulse.sum()) * STEP_S, 1e-300)
+    return pulse(family, t, begin, duration, 1.0)[0] / (duration * _area(family))
 
 
-def _impact(rng: np.random.Generator, t: np.ndarray, pulse: Callable[[np.ndarray, float], np.ndarray]) -> tuple:
+def _area(family: Pulse) -> float:
+    return float(PULSES[family](np.ones(1))[1][0])
+
+
+def _impact(rng: np.random.Generator, t: np.ndarray, family: Pulse) -> tuple:
     """Pulse, arrest by a slower pulse of the same kind, and a push of the CG."""
     s, axis = _sizes(rng, least_arrest_s=0.015), _direction(rng)
-    up = _unit(pulse(t + 0.5 * s.duration_s, s.duration_s))
-    down = _unit(pulse(t - 0.5 * s.duration_s, s.arrest_s))
-    rate = np.cumsum(s.gain_rad_per_s * (up - s.share * down)) * STEP_S
-    push = s.speed_m_per_s * _unit(pulse(t + 0.5 * s.push_s + s.lead_s, s.push_s))
+    up = _rise(family, t, -0.5 * s.duration_s, s.duration_s)
+    down = _rise(family, t, 0.5 * s.duration_s, s.arrest_s)
+    rate = s.gain_rad_per_s * (up - s.share * down)
+    push = s.speed_m_per_s * _unit(family, t, -0.5 * s.push_s - s.lead_s, s.push_s)
     return rate[:, None] * axis, push[:, None] * _direction(rng), s, axis
 
 
-def _sine_squared_pulse(t: np.ndarray, duration: float) -> np.ndarray:
-    return np.where((t > 0) & (t < duration), np.sin(np.pi * t / duration) ** 2, 0.0)
-
-
-def _skewed_pulse(t: np.ndarray, duration: float) -> np.ndarray:
-    x = np.maximum(t, 0.0) / (0.22 * duration)
-    return x**1.5 * np.exp(-x)
-
-
-def _half_sine_pulse(t: np.ndarray, duration: float) -> np.ndarray:
-    return np.where((t > 0) & (t < duration), np.sin(np.pi * np.clip(t / duration, 0, 1)), 0.0)
-
-
 def _sine_squared(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    omega, push, _, _ = _impact(rng, t, _sine_squared_pulse)
+    omega, push, _, _ = _impact(rng, t, "sine_squared")
     return omega, push
 
 
 def _skewed(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A fast rise and a slow fall, and a smaller turn about another axis that comes later."""
-    omega, push, s, axis = _impact(rng, t, _skewed_pulse)
-    late = _unit(_skewed_pulse(t - rng.uniform(0.0, 0.5) * s.duration_s, 2.0 * s.duration_s))
-    late -= _unit(_skewed_pulse(t - 1.5 * s.duration_s, s.arrest_s))
+    omega, push, s, axis = _impact(rng, t, "skewed")
+    late = _rise("skewed", t, rng.uniform(0.0, 0.5) * s.duration_s, 2.0 * s.duration_s)
+    late -= _rise("skewed", t, 1.5 * s.duration_s, s.arrest_s)
     size = rng.uniform(0.1, 0.4) * s.gain_rad_per_s
-    return omega + size * (np.cumsum(late) * STEP_S)[:, None] * _off(axis, rng, 90.0), push
+    return omega + size * late[:, None] * _off(axis, rng, 90.0), push
 
 
-def _double(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two blows: the second smaller, 15 to 50 ms later, about an axis up to 60 degrees away."""
-    first, push, s, axis = _impact(rng, t, _sine_squared_pulse)
+def _two_blows(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The second blow is smaller, 15 to 50 ms later, about an axis up to 60 degrees away."""
+    first, push, s, axis = _impact(rng, t, "sine_squared")
     delay, size = rng.uniform(0.015, 0.050), rng.uniform(0.2, 0.7)
-    up = _unit(_sine_squared_pulse(t - delay, s.duration_s)) - _unit(
-        _sine_squared_pulse(t - delay - s.duration_s, s.arrest_s)
-    )
-    second = size * s.gain_rad_per_s * np.cumsum(up)[:, None] * STEP_S * _off(axis, rng, rng.uniform(0.0, 60.0))
-    again = size * s.speed_m_per_s * _unit(_sine_squared_pulse(t - delay, s.push_s))
+    up = _rise("sine_squared", t, delay, s.duration_s)
+    up -= _rise("sine_squared", t, delay + s.duration_s, s.arrest_s)
+    second = size * s.gain_rad_per_s * up[:, None] * _off(axis, rng, rng.uniform(0.0, 60.0))
+    again = size * s.speed_m_per_s * _unit("sine_squared", t, delay, s.push_s)
     return first + second, push + again[:, None] * _direction(rng)
+
+
+def _many_lobes(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two to four lobes of like angular acceleration, 6 to 30 ms apart, about axes up to 90 degrees away, some back."""
+    s, axis = _sizes(rng, least_arrest_s=0.015), _direction(rng)
+    begin = -0.5 * s.duration_s
+    omega, push = np.zeros((len(t), 3)), np.zeros((len(t), 3))
+    for _ in range(rng.integers(2, 5)):
+        duration = s.duration_s * float(np.exp(rng.uniform(np.log(0.5), np.log(1.5))))
+        about = _off(axis, rng, rng.uniform(0.0, 90.0)) * (1.0 if rng.random() < 0.7 else -1.0)
+        gain = rng.uniform(0.5, 1.0) * duration
+        omega += gain * _rise("sine_squared", t, begin, duration)[:, None] * about
+        push += rng.uniform(0.3, 1.0) * _unit("sine_squared", t, begin - s.lead_s, s.push_s)[:, None] * _direction(rng)
+        end = begin + duration
+        begin += rng.uniform(0.006, 0.030)
+    omega *= (1.0 - s.share * _rise("sine_squared", t, end, s.arrest_s))[:, None]
+    omega *= s.gain_rad_per_s / np.linalg.norm(omega, axis=1).max()
+    return omega, push * s.speed_m_per_s / np.linalg.norm(push.sum(axis=0) * STEP_S)
 
 
 def _half_sine(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A half-sine of acceleration, then an exponential return of the rate towards a part of its gain."""
     s, axis = _sizes(rng), _direction(rng)
-    up = np.cumsum(_unit(_half_sine_pulse(t + 0.5 * s.duration_s, s.duration_s))) * STEP_S
+    up = _rise("half_sine", t, -0.5 * s.duration_s, s.duration_s)
     since = np.maximum(t - 0.5 * s.duration_s, 0.0)
     left = 1.0 - s.share * (1.0 - np.exp(-since / (0.5 * s.arrest_s)))
-    push = s.speed_m_per_s * _unit(_half_sine_pulse(t + 0.5 * s.push_s + s.lead_s, s.push_s))
+    push = s.speed_m_per_s * _unit("half_sine", t, -0.5 * s.push_s - s.lead_s, s.push_s)
     return (s.gain_rad_per_s * up * left)[:, None] * axis, push[:, None] * _direction(rng)
 
 
@@ -245,13 +255,15 @@ def _wobbling(rng: np.random.Generator, t: np.ndarray) -> tuple[np.ndarray, np.n
     side = _off(axis, rng, 90.0)
     omega = s.gain_rad_per_s * shape[:, None] * (np.cos(turn)[:, None] * axis + np.sin(turn)[:, None] * side)
     x = np.maximum(t + 0.6 * s.push_s, 0.0) / (0.3 * s.push_s)
-    return omega, s.speed_m_per_s * _unit(x**2 * np.exp(-x))[:, None] * _direction(rng)
+    push = x**2 * np.exp(-x) / (0.6 * s.push_s)
+    return omega, s.speed_m_per_s * push[:, None] * _direction(rng)
 
 
 _PULSES = {
     "sine_squared": _sine_squared,
     "skewed": _skewed,
-    "double": _double,
+    "two_blows": _two_blows,
+    "many_lobes": _many_lobes,
     "half_sine": _half_sine,
     "wobbling": _wobbling,
 }

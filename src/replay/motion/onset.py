@@ -1,0 +1,95 @@
+"""When the impact sets in, and how the head moved until then: what a collision starts from.
+
+The onset is where the angular or the CG acceleration, whichever is first, rises from a tenth of its peak to a lobe of
+at least half of it: forerunners do not count. The motion at that instant is fitted to the frames before it alone: no
+pulse, whatever its shape, has a say in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from replay.motion.kinematics import Kinematics
+from replay.motion.readout import ANGULAR, LINEAR, read_quiet
+from replay.motion.settings import CameraSettings
+from replay.motion.told import Told, Turning
+
+MAJOR, BEGUN = 0.5, 0.1
+"""Shares of its peak: of the first lobe that counts as the impact, and where it has begun."""
+_SURELY_BEFORE = 0.05
+
+
+@dataclass(frozen=True)
+class BeforeOnset:
+    """Motion of the skull CG just before the impact.
+
+    Parameters
+    ----------
+    frames
+        Number of frames before it.
+    motion
+        One sample, at the median onset of the draws; global axes.
+    sigma_velocity_m_per_s, sigma_omega_rad_per_s
+        ``(3,)`` standard deviations of the velocities' components, global axes.
+    """
+
+    frames: int
+    motion: Kinematics
+    sigma_velocity_m_per_s: np.ndarray
+    sigma_omega_rad_per_s: np.ndarray
+
+
+def onset_index(curve: np.ndarray) -> np.ndarray:
+    """Index at which a resultant ``(..., g)`` sets in, along the last axis; 0 where it never was quiet."""
+    peak = curve.max(axis=-1, keepdims=True)
+    major = np.argmax(curve >= MAJOR * peak, axis=-1)
+    quiet = (curve < BEGUN * peak) & (np.arange(curve.shape[-1]) < major[..., None])
+    last = curve.shape[-1] - 1 - np.argmax(quiet[..., ::-1], axis=-1)
+    return np.where(quiet.any(axis=-1), last + 1, 0)
+
+
+def contact_index(alpha: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Index of the impact's onset in resultants of angular and CG acceleration ``(..., g)``: the first of the two."""
+    return np.minimum(onset_index(alpha), onset_index(acceleration))
+
+
+def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera: CameraSettings) -> BeforeOnset:
+    """Fit the slow motion of a head to the frames that are surely before the impact.
+
+    Parameters
+    ----------
+    turning, position
+        Orientation, and CG in camera axes, as the frames tell them.
+    onsets_s
+        ``(draws,)`` onsets of the drawn motions [s]: frames before their lowest twentieth are used.
+    camera
+        Axes of camera and head.
+    """
+    until, at = float(np.quantile(onsets_s, _SURELY_BEFORE)), float(np.median(onsets_s))
+    spin = read_quiet(turning.told, ANGULAR, until, at)
+    centre = position.values.mean(axis=0)
+    path = read_quiet(Told(position.time_s, position.values - centre, position.information), LINEAR, until, at)
+    base, level = turning.between(len(spin.time_s))
+    here = int(np.searchsorted(spin.time_s, at - 1e-9))
+    to_global = camera.rotation_to_global
+    turned = to_global * base[here] * Rotation.from_rotvec(spin.level - level[here])
+    body, ray = turned.as_matrix(), to_global.as_matrix()
+    omega, velocity = body @ spin.rate, ray @ path.rate
+    motion = Kinematics(
+        time_s=np.array([at]),
+        position_m=to_global.apply(path.level + centre)[None],
+        rotation=Rotation.from_quat((turned * Rotation.from_quat(camera.template_to_head).inv()).as_quat()[None]),
+        velocity_m_per_s=velocity[None],
+        acceleration_m_per_s2=(ray @ path.slope)[None],
+        omega_rad_per_s=omega[None],
+        alpha_rad_per_s2=(body @ spin.slope)[None],
+    )
+    return BeforeOnset(
+        frames=int(np.sum(turning.told.time_s < until)),
+        motion=motion,
+        sigma_velocity_m_per_s=np.sqrt(np.diag(ray @ path.covariance @ ray.T)),
+        sigma_omega_rad_per_s=np.sqrt(np.diag(body @ spin.covariance @ body.T)),
+    )
