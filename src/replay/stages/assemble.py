@@ -51,14 +51,14 @@ def _player(stage: Stage, play: Play, role: str) -> tuple[Model, list[gates.Gate
     """A player's model under the numbers of that player, and the helmet and assembly gates on it."""
     player = play.collision.player(role) if play.collision is not None else None
     worn = player.wears.model_dump() if player is not None else {}
-    pieces = [worn.get(name) or named for name, named in zip(_PIECES, play.model.helmet_pieces)]
+    helmet_piece, *others = (worn.get(name) or named for name, named in zip(_PIECES, play.model.helmet_pieces))
     changed = any(worn.get(name) for name in _PIECES)
     mass = None if changed else play.helmet.mass_kg
     model = models.build_model(
         play.model.preset,
         play.model.resolution,
         helmet_mass_kg=mass,
-        design=models.load_design(*pieces, folder=play.folder),
+        design=models.load_design(str(helmet_piece), *others, folder=play.folder),
         helmet_structure=play.model.helmet_structure,
         brain=play.model.brain_material,
         membranes=play.model.membranes,
