@@ -31,8 +31,9 @@ reads back to the same bits. This page is generated from the formats in the code
 | `settings/` | `play.json`: the play with every default and override spelled out |
 | `inputs/` | checked copies of the raw tracks, `inputs.json` |
 | `reconstruction/` | the protocol's five files, `kinematics.csv`, `gate.json` |
-| `driver/` | `driver_6dof.csv`, `initial_velocity.json` |
+| `driver/` | `driver_6dof.csv`, `initial_velocity.json`; of a collision `starts.json` |
 | `assembly/` | `model.h5`, `parts.csv`, mass properties, inspection, preview, the helmet and assembly gates |
+| `placement/` | of a collision: `scene.h5` with both players, `placement.json`, its gate |
 | `decks/velodyne`, `decks/lsdyna`, `decks/openradioss` | the run decks of the same replay for other solvers |
 | `decks/replay` | a batch script for this program's own solver |
 | `shake/` | the helmet's millisecond of free flight and its gate |

@@ -52,16 +52,17 @@ def test_a_helmet_is_built_once_for_every_mass_and_a_solver_setting_builds_none(
 
 
 @pytest.mark.parametrize(("path", "stages"), [
-    ("window.duration_s", {"reconstruction", "driver"}),
-    ("t0", {"reconstruction", "driver"}),
-    ("model.brain_material", {"assembly", "shake"}),
-    ("solver.contact.pairs", {"assembly", "shake"}),
+    ("window.duration_s", {"reconstruction", "driver", "placement"}),
+    ("t0", {"reconstruction", "driver", "placement"}),
+    ("model.brain_material", {"assembly", "placement", "shake"}),
+    ("solver.contact.pairs", {"assembly", "placement", "shake"}),
     ("shake.speed_m_per_s", {"shake"}),
-    ("gates.numerics.hourglass_share", {"reconstruction", "assembly", "driver", "shake"}),
+    ("collision.aim_m", {"assembly", "driver", "placement", "shake"}),
+    ("gates.numerics.hourglass_share", {"reconstruction", "assembly", "driver", "placement", "shake"}),
 ])  # fmt: skip
 def test_a_stage_is_a_members_own_where_it_stands_on_what_varies(path: str, stages: set[str]) -> None:
     (member,) = members_of("demo", "x", described(vary={path: ["value"]})).values()
-    shared = {"inputs", "reconstruction", "assembly", "driver", "shake", "sensitivity"} - stages
+    shared = {"inputs", "reconstruction", "assembly", "driver", "placement", "shake", "sensitivity"} - stages
     assert set(member.owners) == shared
 
 

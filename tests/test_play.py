@@ -8,7 +8,7 @@ import pytest
 from replay.errors import InputError, InputErrors
 from replay.play import Play, load_play, play_schema, play_schema_text
 
-PLAYS = ("demo", "broadcast", "wearable")
+PLAYS = ("demo", "broadcast", "wearable", "collision-demo")
 
 
 @pytest.fixture
@@ -176,3 +176,29 @@ def test_what_is_withheld_must_be_there_and_have_a_reason(demo):
     assert load_play(demo).withhold == {"video.mp4": "belongs to the league"}
     spoil(demo, "belongs to the league", "''")
     assert "video.mp4 is withheld for no reason" in message(demo)
+
+
+@pytest.fixture
+def collision(tmp_path, repository):
+    """A copy of the collision demo that a test may spoil."""
+    return shutil.copytree(repository / "config" / "plays" / "collision-demo", tmp_path / "collision-demo")
+
+
+def test_a_play_with_two_players_is_a_collision(collision, demo):
+    assert load_play(collision / "play.yaml").mode == "collision"
+    assert load_play(demo / "play.yaml").mode == "driver"
+
+
+def test_an_axis_of_one_point_is_refused(collision):
+    spoil(collision, "q_m: [0.0, 1.0, 0.0]", "q_m: [0.0, 0.0, 0.0]")
+    assert "P and Q are one point" in message(collision)
+
+
+def test_the_start_of_a_player_whom_nobody_filmed_cannot_be_reconstructed(collision):
+    text = (collision / "play.yaml").read_text()
+    head, start = text.split("    start:\n")
+    rest = start[start.index("  aim_m") :]
+    (collision / "play.yaml").write_text(f"{head}    start: {{kind: reconstruction}}\n{rest}")
+    assert "start of the impactor is to be reconstructed, but the tracks show the other player" in message(collision)
+    spoil(collision, "tracked: struck", "tracked: impactor")
+    assert load_play(collision / "play.yaml").collision.impactor.start.fit_s == 0.020

@@ -21,7 +21,8 @@ _STAGES: dict[str, tuple[str, str]] = {
     "inputs": ("inputs", "check the raw tracks and keep copies with their hashes"),
     "reconstruct": ("reconstruct", "tracks or wearable -> 6-DOF motion of the skull CG"),
     "assemble": ("assemble", "build the head and helmet; helmet and assembly gates"),
-    "drive": ("drive", "resample the motion for the solver"),
+    "drive": ("drive", "resample the motion for the solver; how two players start"),
+    "place": ("placement", "two players at first contact; placement gate"),
     "decks": ("decks", "write Velodyne-style and LS-DYNA run decks"),
     "shake": ("shake", "1 ms of free flight of the helmet alone"),
     "impact": ("impact", "the explicit replay"),
@@ -91,7 +92,9 @@ def _parser() -> argparse.ArgumentParser:
 
     synth = commands.add_parser("synth", help="write a synthetic play with known truth")
     synth.add_argument(
-        "kind", choices=["demo", "broadcast", "wearable", "footage"], help="a shipped play, or any footage"
+        "kind",
+        choices=["demo", "broadcast", "wearable", "footage", "headform"],
+        help="a shipped play, any footage, or a headform's record of --motion",
     )
     synth.add_argument("--into", type=Path, required=True, metavar="FOLDER", help="new folder for the play")
     synth.add_argument(
@@ -351,6 +354,8 @@ def _run_tool(arguments: argparse.Namespace) -> int:
         "synth": lambda: (
             tools.write_synthetic_footage(vars(arguments))
             if arguments.kind == "footage"
+            else tools.write_headform_record(arguments.motion, arguments.into, arguments.seed)
+            if arguments.kind == "headform"
             else tools.write_synthetic_play(arguments.kind, arguments.into, arguments.seed)
         ),
         "digitize": lambda: tools.digitise_video(

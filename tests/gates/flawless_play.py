@@ -18,6 +18,7 @@ from replay.gates import (
     hourglass_sensitivity_gate,
     numerics_gate,
     package_gate,
+    placement_gate,
     shake_gate,
     video_reconstruction_gate,
     wearable_reconstruction_gate,
@@ -88,6 +89,13 @@ GOOD: dict[str, dict[str, Any]] = {
         "initial_penetration_m": 0.0,
         "projection_over_edge": 0.1,
         "projection_jacobian_ratio": 0.9,
+        "unresolved_friction_pairs": 0,
+    },
+    "placement": {
+        "gap_error_m": 1e-9,
+        "initial_penetration_m": 0.0,
+        "colliding_ids": 0,
+        "parts_outside_block": 0,
         "unresolved_friction_pairs": 0,
     },
     "shake": {
@@ -176,6 +184,7 @@ def all_gates(limits: Limits) -> dict[str, Gate]:
         "helmet": lambda: helmet_gate(GOOD["helmet"], limits),
         "reconstruction": lambda: video_reconstruction_gate(GOOD["video"], limits),
         "assembly": lambda: assembly_gate(GOOD["assembly"], limits, contact=GOOD["assembly_contact"]),
+        "placement": lambda: placement_gate(GOOD["placement"], limits),
         "shake": lambda: shake_gate(GOOD["shake"], limits, contact_blow_up=False),
         "numerics": lambda: numerics_gate(
             good_ledger(), GOOD_PARTS, GOOD["numerics"], limits, free=True, contact=GOOD["numerics_contact"]

@@ -22,6 +22,7 @@ from replay.gates import (
     hourglass_sensitivity_gate,
     numerics_gate,
     package_gate,
+    placement_gate,
     read_gate,
     shake_gate,
     video_reconstruction_gate,
@@ -61,6 +62,8 @@ def gate_with(name: str, value: float | bool, limits: Limits) -> Gate:
         facts, contact = good["assembly"], good["assembly_contact"]
         (facts if check in facts else contact)[check] = value
         return assembly_gate(facts, limits, contact=contact)
+    if gate == "placement":
+        return placement_gate(good["placement"] | {check: value}, limits)
     if gate == "shake":
         blow_up = value if check == "contact_blow_up" else False
         run = good["shake"] | ({check: value} if check != "contact_blow_up" else {})

@@ -147,6 +147,21 @@ def of(name):
     return manifest
 
 
+def placement(wildcards):
+    """Where two players stand; one driven head has no such stage."""
+    play = wildcards.play.partition(".")[0]
+    return [of("placement")(wildcards)] if said(play).get("collision") else []
+
+
+def evidence(*more):
+    """Manifests of every stage before the verdict that a play of its mode has, and more."""
+
+    def manifests(wildcards):
+        return [*map(stage, (*EVIDENCE, *more)), *placement(wildcards)]
+
+    return manifests
+
+
 # Every stage before the verdict. What reads them all names them all: a stage whose files were removed is run again.
 EVIDENCE = (
     "settings",

@@ -23,6 +23,27 @@ rule assemble:
         "replay assemble {wildcards.play} --carry-on 2>&1 | tee {log}"
 
 
+rule place:
+    input:
+        settings=stage("settings"),
+        assembly=of("assembly"),
+        driver=of("driver"),
+        code=code("placement"),
+    output:
+        stage("placement"),
+    log:
+        log("place"),
+    group:
+        "prepare"
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    message:
+        "{wildcards.play}: bring two players to first contact"
+    shell:
+        "replay place {wildcards.play} --carry-on 2>&1 | tee {log}"
+
+
 rule shake:
     input:
         settings=stage("settings"),
@@ -52,6 +73,7 @@ rule decks:
         settings=stage("settings"),
         assembly=of("assembly"),
         driver=of("driver"),
+        placement=placement,
         code=code("decks"),
     output:
         stage("decks"),

@@ -6,6 +6,7 @@ rule impact:
         settings=stage("settings"),
         assembly=of("assembly"),
         driver=of("driver"),
+        placement=placement,
         shake=of("shake"),
         code=code("impact"),
     output:
@@ -32,6 +33,8 @@ rule sensitivity:
         settings=stage("settings"),
         assembly=of("assembly"),
         driver=of("driver"),
+        placement=placement,
+        shake=of("shake"),
         replay=stage("replay"),
         code=code("sensitivity"),
     output:
@@ -57,6 +60,7 @@ rule fidelity:
     input:
         settings=stage("settings"),
         driver=of("driver"),
+        placement=placement,
         replay=stage("replay"),
         code=code("fidelity"),
     output:
@@ -80,6 +84,7 @@ rule measure:
     input:
         settings=stage("settings"),
         assembly=of("assembly"),
+        placement=placement,
         replay=stage("replay"),
         sensitivity=of("sensitivity"),
         code=code("measure"),

@@ -3,7 +3,7 @@
 
 rule verdict:
     input:
-        stages=[stage(name) for name in EVIDENCE],
+        stages=evidence(),
         code=code("verdict"),
     output:
         stage("verdict"),
@@ -24,7 +24,7 @@ rule verdict:
 
 rule report:
     input:
-        stages=[stage(name) for name in (*EVIDENCE, "verdict")],
+        stages=evidence("verdict"),
         code=code("report"),
     output:
         manifest=stage("report"),
@@ -52,7 +52,7 @@ rule report:
 rule seal:
     input:
         play=description,
-        stages=[stage(name) for name in (*EVIDENCE, "verdict", "report")],
+        stages=evidence("verdict", "report"),
         lock="environment.lock",
         code=code("seal"),
     output:

@@ -9,6 +9,7 @@ from replay.gates.limits import Limit, Limits
 from replay.gates.model import Check, Gate, read_gate
 from replay.gates.numerics import PartEnergy, numerics_gate, part_energies
 from replay.gates.package import package_gate
+from replay.gates.placement import placement_gate
 from replay.gates.reconstruction import video_reconstruction_gate, wearable_reconstruction_gate
 from replay.gates.shake import contact_blow_up, ledger_values, shake_gate
 from replay.gates.verdict import PlayVerdict, play_verdict
@@ -31,6 +32,7 @@ __all__ = [
     "numerics_gate",
     "package_gate",
     "part_energies",
+    "placement_gate",
     "play_verdict",
     "read_gate",
     "shake_gate",

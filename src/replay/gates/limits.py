@@ -103,6 +103,7 @@ class GateFacts:
     stops_run: bool
     source: str
     between_plays: bool = False
+    mode: str = ""
 
 
 class Limits:
@@ -114,19 +115,28 @@ class Limits:
         By full name ``gate.check``.
     gates
         Facts of each gate, in the order of the protocol.
+    mode
+        Of the play: a gate that is for another mode is not asked for.
     """
 
-    def __init__(self, limits: Mapping[str, Limit], gates: Mapping[str, GateFacts]) -> None:
+    def __init__(self, limits: Mapping[str, Limit], gates: Mapping[str, GateFacts], mode: str = "driver") -> None:
+        self.mode = mode
         self._limits = MappingProxyType(dict(limits))
         self.gates = MappingProxyType(dict(gates))
 
     @property
     def protocol(self) -> dict[str, GateFacts]:
-        """The gates that every play passes, in order; without those that judge plays against each other."""
-        return {name: facts for name, facts in self.gates.items() if not facts.between_plays}
+        """The gates that every play of this mode passes, in order; without those that judge plays against others."""
+        return {
+            name: facts
+            for name, facts in self.gates.items()
+            if not facts.between_plays and facts.mode in ("", self.mode)
+        }
 
     @classmethod
-    def load(cls, overrides: Mapping[str, Any] | None = None, *, file: str | Path = "play.yaml") -> Limits:
+    def load(
+        cls, overrides: Mapping[str, Any] | None = None, *, file: str | Path = "play.yaml", mode: str = "driver"
+    ) -> Limits:
         """Load the shipped limits and apply a play's settings.
 
         Parameters
@@ -136,6 +146,8 @@ class Limits:
             ``{"gate.check": {"fail_above": number, ...}}``.
         file
             Named in errors: where the overrides were written.
+        mode
+            Of the play, ``driver`` or ``collision``.
 
         Raises
         ------
@@ -151,7 +163,7 @@ class Limits:
                 errors.append(error)
         if errors:
             raise errors[0] if len(errors) == 1 else InputErrors(errors)
-        return cls(changed, gates)
+        return cls(changed, gates, mode)
 
     def __getitem__(self, name: str) -> Limit:
         return self._limits[name]

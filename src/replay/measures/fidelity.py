@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
 
 from replay.errors import InputError
 from replay.measures.head import Peak, peak, resultant
@@ -105,6 +106,25 @@ class Motion:
             columns[f"a{axis}_m_per_s2"] = np.gradient(columns[f"v{axis}_m_per_s"], time, edge_order=2)
             columns[f"alpha_{axis}_rad_per_s2"] = np.gradient(columns[f"omega_{axis}_rad_per_s"], time, edge_order=2)
         return cls.from_columns(columns)
+
+    def of_point(self, point_m: ArrayLike) -> Motion:
+        """Return the motion of another point of the same rigid body.
+
+        Parameters
+        ----------
+        point_m : (3,)
+            Where the point is at the first sample [m].
+        """
+        turned = Rotation.from_quat(self.quaternion) * Rotation.from_quat(self.quaternion[0]).inv()
+        arm = turned.apply(np.asarray(point_m, dtype=float) - self.position_m[0])
+        omega, alpha = self.angular_velocity_rad_per_s, self.angular_acceleration_rad_per_s2
+        swing = np.cross(omega, arm)
+        return replace(
+            self,
+            position_m=self.position_m + arm,
+            velocity_m_per_s=self.velocity_m_per_s + swing,
+            acceleration_m_per_s2=self.acceleration_m_per_s2 + np.cross(alpha, arm) + np.cross(omega, swing),
+        )
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,9 @@ def friction_pairs(model: Model) -> tuple[tuple[int, str, int], ...]:
     return (skin, comfort, 1), (skin, energy, 1), (skin, "chin_cup", 2)
 
 
-def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None = None) -> MassProperties:
+def assembly_mass(
+    model: Model, assembly: str | None = None, *, name: str | None = None, player: int | None = None
+) -> MassProperties:
     """Mass properties of an assembly, of one part by name, or of everything.
 
     Parameters
@@ -40,8 +42,10 @@ def assembly_mass(model: Model, assembly: str | None = None, *, name: str | None
         ``head`` or ``helmet``.
     name
         Name of one part.
+    player
+        1, the struck one, or 2.
     """
-    chosen = model.elements_of(assembly=assembly)
+    chosen = model.elements_of(assembly=assembly, player=player)
     if name is not None:
         chosen &= model.element_part == model.part_index(name)
     return mass_properties(model.nodes, model.hexes[chosen], model.element_densities()[chosen])
@@ -171,8 +175,7 @@ def assembly_inspection(
     """
     head, helmet = assembly_mass(model, "head"), assembly_mass(model, "helmet")
     pids = [part.pid for part in model.parts]
-    blocks = {part: blocks_of(model).of(part.assembly) for part in model.parts}
-    outside = [part.name for part, (first, last) in blocks.items() if not first < part.pid <= last]
+    outside = parts_outside_block(model)
     loose = unconnected_parts(model)
     unresolved = [
         f"{pid}-{other}"
@@ -197,6 +200,12 @@ def assembly_inspection(
         "unresolved_friction_pairs_detail": ", ".join(unresolved),
         "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
     }
+
+
+def parts_outside_block(model: Model) -> list[str]:
+    """Names of the parts whose number lies outside the block of their player's assembly (protocol 1.6)."""
+    block = [PLAYERS[model.info.get("player", part.player)].of(part.assembly) for part in model.parts]
+    return [part.name for part, (low, high) in zip(model.parts, block) if not low < part.pid <= high]
 
 
 def unconnected_parts(model: Model) -> list[str]:

@@ -77,6 +77,11 @@ class Part:
     assembly: str
     material: str
 
+    @property
+    def player(self) -> int:
+        """1, or 2 for a part whose number lies in a block of the second player."""
+        return 2 if self.pid // 10_000_000 in (2, 4) else 1
+
 
 @dataclass(frozen=True)
 class ModelJoint:
@@ -181,12 +186,14 @@ class Model:
                 return index
         raise KeyError(name)
 
-    def elements_of(self, *, role: str | None = None, assembly: str | None = None) -> np.ndarray:
-        """Mask (m,) bool of the elements whose part has this role and belongs to this assembly."""
-        chosen = np.array(
-            [(role in (None, p.role)) and (assembly in (None, p.assembly)) for p in self.parts], dtype=bool
-        )
-        return chosen[self.element_part]
+    def elements_of(
+        self, *, role: str | None = None, assembly: str | None = None, player: int | None = None
+    ) -> np.ndarray:
+        """Mask (m,) bool of the elements whose part has this role and belongs to this assembly and player."""
+        chosen = [
+            role in (None, p.role) and assembly in (None, p.assembly) and player in (None, p.player) for p in self.parts
+        ]
+        return np.array(chosen, dtype=bool)[self.element_part]
 
     def element_densities(self) -> np.ndarray:
         """Density of each element, (m,) float64 [kg/m^3]."""

@@ -4,6 +4,7 @@ from replay.motion.driver import Driver, DriverQuality, build_driver
 from replay.motion.kinematics import DRIVER, KINEMATICS, Kinematics
 from replay.motion.quality import ReconstructionQuality
 from replay.motion.reconstruct import Reconstruction, check_tracks, reconstruct
+from replay.motion.start import fit_start
 from replay.motion.synthetic import Impact, SyntheticPlay, synthesise
 
 __all__ = [
@@ -18,6 +19,7 @@ __all__ = [
     "SyntheticPlay",
     "build_driver",
     "check_tracks",
+    "fit_start",
     "reconstruct",
     "synthesise",
 ]

@@ -4,6 +4,7 @@ Every setting has a description, a unit in its name and, where one is sensible, 
 schema of ``workflow/schemas/play.schema.json`` is generated from these models.
 """
 
+from replay.play.collision import Collision, GivenStart, Player, ReconstructedStart
 from replay.play.controls import (
     BulkViscosity,
     Contact,
@@ -47,12 +48,14 @@ __all__ = [
     "ButterworthFilter",
     "CfcFilter",
     "ClicksSource",
+    "Collision",
     "Contact",
     "ContactSettings",
     "EnsembleSettings",
     "Estimate",
     "Filter",
     "FrictionPair",
+    "GivenStart",
     "Helmet",
     "Hourglass",
     "InputFile",
@@ -61,8 +64,10 @@ __all__ = [
     "NoFilter",
     "NotNegative",
     "Play",
+    "Player",
     "Positive",
     "Quaternion",
+    "ReconstructedStart",
     "ReconstructionChoice",
     "Row",
     "Shake",

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from replay.documents import Number, Setting, load_yaml, refuse
+from replay.play.collision import Collision
 from replay.play.controls import Shake, SolverSettings
 from replay.play.fields import NotNegative
 from replay.play.model import Helmet, ModelChoice
@@ -71,6 +72,11 @@ class Play(Setting):
     model: ModelChoice = Field(default_factory=lambda: ModelChoice(), description="The finite-element model.")
     solver: SolverSettings = Field(default_factory=lambda: SolverSettings(), description="Controls of the solver.")
     shake: Shake = Field(default_factory=lambda: Shake(), description="Stability check of the helmet.")
+    collision: Collision | None = Field(
+        default=None,
+        description="Two players: with this block the play is a collision, free of any driver; without it one head is "
+        "driven along its reconstructed motion.",
+    )
     gates: dict[str, Number | dict[str, Number]] = Field(
         default_factory=dict,
         description="Limits this play sets itself, `gate.check: number` or `gate.check: {fail_above: number}`; "
@@ -103,6 +109,11 @@ class Play(Setting):
                 "remove the block `reconstruction`",
             )
         return self
+
+    @property
+    def mode(self) -> Literal["driver", "collision"]:
+        """Whether one head is driven, or two players collide."""
+        return "driver" if self.collision is None else "collision"
 
     @property
     def folder(self) -> Path:

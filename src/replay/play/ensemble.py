@@ -39,8 +39,9 @@ _OF_CONTACT = tuple(f"solver.contact.{name}" for name in ("scheme", "points", "p
 _STANDS_ON: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "inputs": ((), ()),
     "reconstruction": (("t0", "window", "reconstruction.mode", "reconstruction.ensemble", "gates"), ()),
-    "assembly": (("helmet", "model", "gates", *_OF_CONTACT), ()),
-    "driver": (("window", "reconstruction"), ("reconstruction",)),
+    "assembly": (("helmet", "model", "collision", "gates", *_OF_CONTACT), ()),
+    "driver": (("window", "reconstruction", "collision"), ("reconstruction",)),
+    "placement": (("collision", "solver.contact", "gates"), ("assembly", "driver")),
     "shake": (("solver", "shake", "gates"), ("assembly",)),
 }
 # A sensitivity run costs what the replay costs: the play's own speaks for its members.

@@ -26,6 +26,8 @@ ROLE_COLOURS = {
     "shell": "#5f7ea3",
     "facemask": "#4a4f57",
     "chin_cup": "#a58ab8",
+    "bone": "#efe3bf",
+    "flesh": "#d9a98a",
 }
 _OTHER = "#c9ced6"
 # Faces of a hexahedron, each seen counter-clockwise from outside.

@@ -126,6 +126,14 @@ class ReportInput:
         assumed, article), ``source``.
     mesh, snapshots
         For the pictures of the model and of the strain.
+    published
+        Values of a collision by the keys of ``published.yaml``; None of a driven head.
+    blow
+        blow_force.csv: the impactor's force on the struck player; None of a driven head.
+    pads
+        Rows of the pads: ``part``, ``compression_mean``, ``compression_max``, ``time_s``.
+    scene
+        Picture of two players at first contact, PNG; None of a driven head.
     cannot_show
         Sentences on what this run cannot show, beside those that hold for every run.
     inputs
@@ -165,6 +173,10 @@ class ReportInput:
     parameters: Sequence[Row] = ()
     mesh: MeshView | None = None
     snapshots: Snapshots | None = None
+    published: Mapping[str, float | None] | None = None
+    blow: pd.DataFrame | None = None
+    pads: Sequence[Row] = ()
+    scene: bytes | None = None
     cannot_show: Sequence[str] = ()
     inputs: Sequence[Row] = ()
     provenance: Mapping[str, Any] = field(default_factory=dict)

@@ -10,10 +10,12 @@ from pathlib import Path
 
 from replay.files import atomic_path, write_text
 from replay.report import sections
+from replay.report.collision import collision_figures, pads_table
 from replay.report.damage import damage_section
 from replay.report.figure import Picture
 from replay.report.markup import section, text
 from replay.report.model import ReportInput
+from replay.report.published import published_section
 from replay.report.verdict_view import banner, gates_section
 
 
@@ -42,11 +44,20 @@ def write_report(folder: str | Path, report: ReportInput) -> Path:
     return folder / "report.html"
 
 
+def _collision(report: ReportInput, pictures: list[Picture]) -> list[tuple[str, str, str]]:
+    """Return the section that only two players have."""
+    if report.published is None:
+        return []
+    content = collision_figures(report, pictures) + published_section(report.published) + pads_table(report)
+    return [("collision", "The collision", content)]
+
+
 def _page(report: ReportInput, pictures: list[Picture]) -> str:
     parts = [
         ("play", "The play", sections.play_section(report)),
         ("gates", "Gates", gates_section(report)),
         ("driver", "Driver fidelity", sections.driver_section(report, pictures)),
+        *_collision(report, pictures),
         ("motion", "Head motion", sections.motion_section(report, pictures)),
         ("numerics", "Solver", sections.numerics_section(report, pictures)),
         ("brain", "Brain", sections.brain_section(report, pictures)),

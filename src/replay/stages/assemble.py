@@ -20,31 +20,21 @@ from replay.stages.problem import controls_of, resting_problem, seated_by_contac
 from replay.stages.resolved import read_settings
 
 _MOST_PLACES = 4
+_PIECES = ("helmet", "facemask", "pads", "chinstrap")
 
 
 def run(workspace: Workspace) -> str | None:
-    """Build the model of the play's settings; the helmet gate comes before the assembly gate."""
+    """Build the play's head and helmet, or its two players; the helmet gate comes before the assembly gate."""
     stage = Stage(workspace, "assembly", after=["settings"])
     play = read_settings(stage)
-    limits = limits_of(stage)
     for file in play.model.files:
         stage.follow("inputs")
         stage.read("inputs", file)
-    model = models.build_model(
-        play.model.preset,
-        play.model.resolution,
-        helmet_mass_kg=play.helmet.mass_kg,
-        design=models.load_design(*play.model.helmet_pieces, folder=play.folder),
-        helmet_structure=play.model.helmet_structure,
-        brain=play.model.brain_material,
-        membranes=play.model.membranes,
-        outlet=play.model.outlet,
-        seat=play.model.helmet_seat,
-    )
-    contact = None
-    if seated_by_contact(model):
-        model, contact = seat_helmet(stage, play, model)
-    print(models.summary_text(model))
+    model, judged = _player(stage, play, "struck")
+    if play.collision is not None:
+        impactor, also = _player(stage, play, "impactor")
+        models.write_model(stage.write("impactor.h5", "the striking player"), impactor)
+        judged = [_both(*pair) for pair in zip(judged, also)]
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
     models.write_parts_table(stage.write("parts.csv", "parts with material, volume, mass and quality"), model)
     models.write_preview(stage.write("preview.png", "the model from outside and cut in half"), model)
@@ -52,23 +42,60 @@ def run(workspace: Workspace) -> str | None:
         stage.write("mass_properties.json", "mass, centre of gravity, inertia (protocol 1.3)"),
         models.mass_report(model),
     )
-    helmet = models.helmet_inspection(model)
-    assembly = models.assembly_inspection(model, helmet_mass_kg=play.helmet.mass_kg)
-    write_json(
-        stage.write("inspection.json", "what the helmet and assembly gates were told"),
-        {"helmet": helmet, "assembly": assembly},
-    )
-    judged = [
-        gates.helmet_gate(told(helmet, HELMET_CHECKS), limits),
-        gates.assembly_gate(told(assembly, ASSEMBLY_CHECKS), limits, contact=contact),
-    ]
     judged[0].write(stage.write("gate_helmet.json", "gate: helmet readiness"))
     judged[1].write(stage.write("gate.json", "gate: assembly"))
     return stage.finish(judged, parameters=dict(model.info))
 
 
-def seat_helmet(stage: Stage, play: Play, model: Model) -> tuple[Model, dict[str, Any]]:
+def _player(stage: Stage, play: Play, role: str) -> tuple[Model, list[gates.Gate]]:
+    """A player's model under the numbers of that player, and the helmet and assembly gates on it."""
+    player = play.collision.player(role) if play.collision is not None else None
+    worn = player.wears.model_dump() if player is not None else {}
+    helmet_piece, *others = (worn.get(name) or named for name, named in zip(_PIECES, play.model.helmet_pieces))
+    changed = any(worn.get(name) for name in _PIECES)
+    mass = None if changed else play.helmet.mass_kg
+    model = models.build_model(
+        play.model.preset,
+        play.model.resolution,
+        helmet_mass_kg=mass,
+        design=models.load_design(str(helmet_piece), *others, folder=play.folder),
+        helmet_structure=play.model.helmet_structure,
+        brain=play.model.brain_material,
+        membranes=play.model.membranes,
+        outlet=play.model.outlet,
+        seat=play.model.helmet_seat,
+    )
+    before = "" if role == "struck" else f"{role}_"
+    contact = None
+    if seated_by_contact(model):
+        model, contact = seat_helmet(stage, play, model, before)
+    helmet = models.helmet_inspection(model)
+    if player is not None and player.body is not None:
+        model = models.with_body(model, models.BodyPlan(**player.body.model_dump()))
+    assembly = models.assembly_inspection(model, helmet_mass_kg=mass)
+    print(models.summary_text(model))
+    write_json(
+        stage.write(f"{before}inspection.json", "what the helmet and assembly gates were told"),
+        {"helmet": helmet, "assembly": assembly},
+    )
+    limits = limits_of(stage)
+    judged = [
+        gates.helmet_gate(told(helmet, HELMET_CHECKS), limits),
+        gates.assembly_gate(told(assembly, ASSEMBLY_CHECKS), limits, contact=contact),
+    ]
+    return (model if role == "struck" else models.second_player(model)), judged
+
+
+def _both(struck: gates.Gate, impactor: gates.Gate) -> gates.Gate:
+    """One gate of both players' checks."""
+    also = (dataclasses.replace(check, name=f"{check.name}: impactor") for check in impactor.checks)
+    return dataclasses.replace(struck, checks=(*struck.checks, *also))
+
+
+def seat_helmet(stage: Stage, play: Play, model: Model, before: str) -> tuple[Model, dict[str, Any]]:
     """Put the helmet where the play has it, and take out what then lies inside the head (protocol 3.1).
+
+    `before` stands before the name of the table of penetrations.
 
     Returns
     -------
@@ -81,7 +108,7 @@ def seat_helmet(stage: Stage, play: Play, model: Model) -> tuple[Model, dict[str
     problem = resting_problem(model, controls_of(play, 1.0, checkpoint_every_s=0.0), play.solver.contact)
     found = seat(problem)
     PENETRATION_TABLE.write(
-        stage.write("penetrations.csv", "initial penetrations: nodes inside, and nodes moved (protocol 3.1)"),
+        stage.write(f"{before}penetrations.csv", "initial penetrations: nodes inside, and nodes moved (protocol 3.1)"),
         penetration_table(found, problem),
     )
     places = found.places([part.name for part in model.parts], nodes)

@@ -49,8 +49,8 @@ def unresolved_names(model: Parted, contact: ContactSettings) -> list[tuple[str,
     return [(path, name) for path, name in named if not part_numbers(model, name)]
 
 
-def contact_controls(model: Parted, contact: ContactSettings) -> ContactControls:
-    """Contact of the parts that a model has; pairs of which it lacks a side are left out."""
+def contact_controls(model: Parted, contact: ContactSettings, more: tuple[ContactPair, ...] = ()) -> ContactControls:
+    """Contact of the parts that a model has, with further pairs; pairs of which it lacks a side are left out."""
     pairs = []
     for pair in contact.pairs:
         first, second = part_numbers(model, pair.first), part_numbers(model, pair.second)
@@ -62,7 +62,7 @@ def contact_controls(model: Parted, contact: ContactSettings) -> ContactControls
         tolerance=contact.tolerance,
         points=contact.points,
         friction=contact.friction,
-        pairs=tuple(pairs),
+        pairs=(*pairs, *more),
         self_contact=tuple(dict.fromkeys(itself)),
     )
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from replay import decks
+from replay.files import read_json
 from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.play import Play, estimate
 from replay.stages.frame import Stage, Workspace
+from replay.stages.impact import replayed_model
 from replay.stages.own_deck import model_facts, node_sets, region_sets
+from replay.stages.players import PLAYER_SETS
 from replay.stages.problem import chin_straps, seated_by_contact
 from replay.stages.resolved import read_settings
 
@@ -25,13 +31,15 @@ _EVERYTHING = "all_parts"
 
 def run(workspace: Workspace) -> str | None:
     """Write both decks with the model posed at the start of the window."""
-    stage = Stage(workspace, "decks", after=["settings", "assembly", "driver"])
+    stage = Stage(workspace, "decks", after=["settings", "assembly", "driver", "placement"])
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
-    model = read_model(stage.read("assembly", "model.h5"))
-    driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
-    deck = deck_input(play, model, driver)
+    if play.collision is not None:
+        deck = collision_deck(play, replayed_model(stage), read_json(stage.read("placement", "placement.json")))
+    else:
+        model = read_model(stage.read("assembly", "model.h5"))
+        deck = deck_input(play, model, Kinematics.read(stage.read("driver", "driver_6dof.csv")))
     folder = stage.folder_for_many()
     for solver, write in _WRITERS:
         for path in write(folder / solver, deck):
@@ -52,27 +60,9 @@ def deck_input(play: Play, model: Model, driver: Kinematics) -> decks.DeckInput:
     """What both writers need: the solver's own problem, in their terms."""
     position = driver.position_m[0]
     speed, p, q = decks.axis_through(position, driver.omega_rad_per_s[0])
-    settings = play.solver
     return decks.DeckInput(
-        title=f"{play.name}: {play.title}" if play.title else play.name,
+        **_common(play, model),
         nodes=position + driver.rotation[0].apply(model.nodes),
-        node_ids=model.node_ids,
-        hexes=model.hexes,
-        element_ids=model.element_ids,
-        element_part=model.element_part,
-        parts=decks.deck_parts(model.parts, model.materials),
-        part_sets=tuple(decks.PartSet(model.part_set_ids[name], name, pids) for name, pids in model.part_sets.items()),
-        controls=decks.DeckControls(
-            termination_time_s=play.window.duration_s,
-            time_step_factor=settings.time_step_factor,
-            plot_interval_s=settings.plot_interval_s,
-            history_interval_s=settings.history_interval_s,
-            hourglass_method=_HOURGLASS_METHODS[settings.hourglass.method],
-            hourglass_coefficient=settings.hourglass.coefficient,
-            bulk_viscosity_quadratic=settings.bulk_viscosity.quadratic,
-            bulk_viscosity_linear=settings.bulk_viscosity.linear,
-            mass_scaling_time_step_s=settings.mass_scaling_time_step_s,
-        ),
         initial_velocities=(
             decks.InitialVelocity(model.part_set_ids[_EVERYTHING], _triple(driver.velocity_m_per_s[0]), speed, p, q),
         ),
@@ -87,11 +77,58 @@ def deck_input(play: Play, model: Model, driver: Kinematics) -> decks.DeckInput:
             decks.Cable(strap.name, int(strap.nodes[0]), int(strap.nodes[-1]), strap.stiffness_n_per_m)
             for strap in chin_straps(model)[1]
         ),
-        notes=tuple(model.info["notes"]),
-        node_sets=node_sets(model),
-        element_sets=region_sets(model),
         facts=model_facts(model, driver.position_m[0], driver.rotation[0]),
     )
+
+
+def collision_deck(play: Play, scene: Model, placement: dict[str, Any]) -> decks.DeckInput:
+    """Both players with their initial velocities (protocol 3.6), and contact of everything."""
+    assert play.collision is not None
+    velocities = []
+    for role, names in PLAYER_SETS.items():
+        start = placement["players"][role]
+        p, q = (_triple(np.array(start[key])) for key in ("P_global_m", "Q_global_m"))
+        velocity = _triple(np.array(start["velocity_m_per_s"]))
+        for name in (name for name in names if name in scene.part_sets):
+            number = scene.part_set_ids[name]
+            velocities.append(decks.InitialVelocity(number, velocity, start["omega_rad_per_s"], p, q))
+    return decks.DeckInput(
+        **_common(play, scene),
+        nodes=scene.nodes,
+        initial_velocities=tuple(velocities),
+        contact=True,
+        facts=model_facts(scene, np.zeros(3), Rotation.identity()),
+    )
+
+
+def _common(play: Play, model: Model) -> dict[str, Any]:
+    """What a deck says of its model and controls, driven or colliding."""
+    settings = play.solver
+    return {
+        "title": f"{play.name}: {play.title}" if play.title else play.name,
+        "node_ids": model.node_ids,
+        "hexes": model.hexes,
+        "element_ids": model.element_ids,
+        "element_part": model.element_part,
+        "parts": decks.deck_parts(model.parts, model.materials),
+        "part_sets": tuple(
+            decks.PartSet(model.part_set_ids[name], name, pids) for name, pids in model.part_sets.items()
+        ),
+        "controls": decks.DeckControls(
+            termination_time_s=play.window.duration_s,
+            time_step_factor=settings.time_step_factor,
+            plot_interval_s=settings.plot_interval_s,
+            history_interval_s=settings.history_interval_s,
+            hourglass_method=_HOURGLASS_METHODS[settings.hourglass.method],
+            hourglass_coefficient=settings.hourglass.coefficient,
+            bulk_viscosity_quadratic=settings.bulk_viscosity.quadratic,
+            bulk_viscosity_linear=settings.bulk_viscosity.linear,
+            mass_scaling_time_step_s=settings.mass_scaling_time_step_s,
+        ),
+        "notes": tuple(model.info["notes"]),
+        "node_sets": node_sets(model),
+        "element_sets": region_sets(model),
+    }
 
 
 def _triple(vector: np.ndarray) -> tuple[float, float, float]:

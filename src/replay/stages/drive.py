@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from replay.files import read_json
+from replay.files import read_json, write_json
 from replay.motion import Kinematics, build_driver
 from replay.stages.frame import Stage, Workspace
+from replay.stages.players import ROLES, start_of
 from replay.stages.resolved import read_settings
 
 
@@ -18,6 +19,7 @@ def run(workspace: Workspace) -> str | None:
     play = read_settings(stage)
     chosen = play.reconstruction
     source = "kinematics.csv" if chosen.mode == "protocol" else "posterior_motion.csv"
+    motion = Kinematics.read(stage.read("reconstruction", source))
     t0 = read_json(stage.read("reconstruction", "quality.json"))["driving_t0_s"]
     if chosen.draw:
         # a drawn driver is sampled already, on a clock that begins with the window
@@ -25,15 +27,18 @@ def run(workspace: Workspace) -> str | None:
         driver = build_driver(drawn, play.window.before_t0_s, play.window)
         driver = replace(driver, start_s=t0 - play.window.before_t0_s)
     else:
-        driver = build_driver(Kinematics.read(stage.read("reconstruction", source)), t0, play.window)
+        driver = build_driver(motion, t0, play.window)
     driver.write(
         stage.write_all(
             {
-                "driver_6dof.csv": "motion prescribed to the skull's centre of gravity, global axes",
+                "driver_6dof.csv": "motion of the skull's centre of gravity, global axes: what a driven head is told",
                 "initial_velocity.json": "velocities, pose and axis P-Q at the start; overshoot and closure",
             }
         )
     )
+    if play.collision is not None:
+        starts = {role: start_of(play.collision, role, motion, driver.start_s).to_json() for role in ROLES}
+        write_json(stage.write("starts.json", "posture and velocities of both players at first contact"), starts)
     quality = driver.quality
     print(
         f"driver: {play.window.duration_s * 1e3:g} ms from {driver.start_s:.4f} s; overshoot of acceleration "

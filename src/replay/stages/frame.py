@@ -64,7 +64,7 @@ class Finished:
     workspace
         Where the play's files are.
     stages
-        The stages; their files must not have changed since.
+        The stages, as far as the play's mode has them; their files must not have changed since.
 
     Raises
     ------
@@ -74,7 +74,9 @@ class Finished:
 
     def __init__(self, workspace: Workspace, stages: Sequence[str]) -> None:
         self.workspace = workspace
-        self._before: dict[str, StageManifest] = {stage: check_stage(workspace, stage) for stage in stages}
+        self._before: dict[str, StageManifest] = {
+            stage: check_stage(workspace, stage) for stage in stages if stage in stages_of(workspace)
+        }
         self._inputs: dict[str, Path] = {}
 
     def follow(self, stage: str) -> None:
@@ -112,8 +114,8 @@ class Finished:
         return path
 
     def made(self, stage: str, path: str) -> bool:
-        """Whether an earlier stage made a file; a play that was stopped has fewer."""
-        return self._before[stage].artifact(path) is not None
+        """Whether an earlier stage made a file; a play that was stopped has fewer, one of another mode other stages."""
+        return stage in self._before and self._before[stage].artifact(path) is not None
 
 
 class Stage(Finished):
@@ -257,6 +259,7 @@ COMMANDS = {
     "reconstruction": "reconstruct",
     "driver": "drive",
     "assembly": "assemble",
+    "placement": "place",
     "decks": "decks",
     "shake": "shake",
     "replay": "impact",
@@ -268,3 +271,11 @@ COMMANDS = {
 }
 STAGES = tuple(COMMANDS)
 """Every stage with a manifest, in the order of the protocol."""
+_OF_COLLISIONS = ("placement",)
+
+
+def stages_of(workspace: Workspace) -> tuple[str, ...]:
+    """The stages that a play of this mode has, by its resolved settings."""
+    settings = workspace.folder("settings") / "play.json"
+    collides = settings.is_file() and read_json(settings).get("collision") is not None
+    return tuple(stage for stage in STAGES if collides or stage not in _OF_COLLISIONS)

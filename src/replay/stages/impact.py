@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 from replay.errors import InstabilityError, ResumeError
 from replay.files import read_json
 from replay.gates import Gate, numerics_gate, part_energies
-from replay.measures import BrainRecorder, DamageRecorder
+from replay.measures import BrainRecorder, DamageRecorder, PadRecorder
 from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
+from replay.stages.collision import collision_problem
 from replay.stages.contact import contact_numbers
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
+from replay.stages.placement import SCENE
 from replay.stages.problem import controls_of, driven_problem
 from replay.stages.resolved import read_settings
 
@@ -38,21 +40,23 @@ BRAIN_FILES = {
     "element_peaks.csv": "peaks of every brain element",
     "brain_snapshots.h5": "strain of every brain element over time",
 }
+PAD_FILES = {"pads.csv": "compression of the helmets' pads over time"}
 DAMAGE_FILES = {
     "brain_damage.csv": "damaged volume of the brain by region over time",
     "element_damage.csv": "damage of every brain element and its onset",
     "damage_sensitivity.csv": "damage with other constants of pore growth",
 }
+BEFORE_A_RUN = ("settings", "assembly", "driver", "placement", "shake")
 # What an interrupted run leaves and a later one goes on from.
 UNFINISHED = ("checkpoint", "states.partial")
 
 
 def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s: float = 10.0) -> str | None:
-    """Replay the impact with the driven skull, going on from a checkpoint where there is one."""
-    stage = Stage(workspace, "replay", after=["settings", "assembly", "driver", "shake"], keep=UNFINISHED)
+    """Replay the impact, of a driven skull or of two players, going on from a checkpoint where there is one."""
+    stage = Stage(workspace, "replay", after=BEFORE_A_RUN, keep=UNFINISHED)
     if stage.stopped_by:
         return stage.skip()
-    refusal = run_driven(stage, threads=threads, checkpoint_every_s=checkpoint_every_s)
+    refusal = run_play(stage, threads=threads, checkpoint_every_s=checkpoint_every_s)
     if refusal:
         return refusal
     gate = judge_numerics(stage)
@@ -60,10 +64,10 @@ def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s:
     return stage.finish([gate])
 
 
-def run_driven(
+def run_play(
     stage: Stage, *, threads: int | None, checkpoint_every_s: float, hourglass_factor: float = 1.0
 ) -> str | None:
-    """Run head and helmet along the play's driver in the stage's folder.
+    """Run the play in the stage's folder: head and helmet along its driver, or two players into each other.
 
     Returns
     -------
@@ -71,18 +75,29 @@ def run_driven(
         Why the solver stopped itself, when it did; the stage is then finished.
     """
     play = read_settings(stage)
-    model = read_model(stage.read("assembly", "model.h5"))
-    driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
+    model = replayed_model(stage)
     controls = controls_of(
         play, play.window.duration_s, checkpoint_every_s=checkpoint_every_s, hourglass_factor=hourglass_factor
     )
-    problem = driven_problem(model, driver, controls, play.solver.contact)
-    files = {**RUN_FILES, **BRAIN_FILES}
-    recorders: list[Recorder] = [brain_recorder(model)]
+    if play.collision is not None:
+        placement = read_json(stage.read("placement", "placement.json"))
+        problem = collision_problem(model, placement, controls, play)
+    else:
+        driver = Kinematics.read(stage.read("driver", "driver_6dof.csv"))
+        problem = driven_problem(model, driver, controls, play.solver.contact)
+    files = {**RUN_FILES, **BRAIN_FILES, **PAD_FILES}
+    recorders: list[Recorder] = [brain_recorder(model), pad_recorder(model)]
     if model.has_damage:
         recorders.append(damage_recorder(model))
         files |= DAMAGE_FILES
     return run_solver(stage, problem, recorders, files, threads=threads)
+
+
+def replayed_model(stage: Stage) -> Model:
+    """The model that is replayed: the assembled one, or the scene of two players."""
+    if stage.made("placement", SCENE):
+        return read_model(stage.read("placement", SCENE))
+    return read_model(stage.read("assembly", "model.h5"))
 
 
 def run_solver(
@@ -110,14 +125,21 @@ def brain_recorder(model: Model) -> BrainRecorder:
     return BrainRecorder(*_brain(model))
 
 
+def pad_recorder(model: Model) -> PadRecorder:
+    """Recorder of all pads and chin cups."""
+    roles = ("comfort_pad", "energy_pad", "chin_cup")
+    pads = {p.name: np.flatnonzero(model.element_part == k) for k, p in enumerate(model.parts) if p.role in roles}
+    return PadRecorder(pads)
+
+
 def damage_recorder(model: Model) -> DamageRecorder:
     """Recorder of the brain's damage variable."""
     return DamageRecorder(*_brain(model), model.materials["brain"]["parameters"])
 
 
 def _brain(model: Model) -> tuple[NDArray[np.int64], NDArray[np.int64], dict[str, NDArray[np.int64]]]:
-    """Rows of the brain's elements, their numbers, and their positions by region."""
-    rows = np.flatnonzero(model.elements_of(role="brain"))
+    """Rows of the struck brain's elements, their numbers, and their positions by region."""
+    rows = np.flatnonzero(model.elements_of(role="brain", player=1))
     region = model.element_region[rows]
     groups = {name: np.flatnonzero(region == k) for k, name in enumerate(model.region_names) if k > 0}
     return rows, model.element_ids[rows], groups
@@ -129,7 +151,7 @@ def judge_numerics(stage: Stage) -> Gate:
     steps = pd.read_csv(stage.folder / "timestep.csv")
     parts = pd.read_csv(stage.folder / "part_energy.csv")
     summary = read_json(stage.folder / "run.json")
-    model = read_model(stage.read("assembly", "model.h5"))
+    model = replayed_model(stage)
     fluid = [part.pid for part in model.parts if model.materials[part.material]["law"] == "fluid"]
     return numerics_gate(
         {str(name): energy[name].to_numpy() for name in energy},
@@ -137,6 +159,7 @@ def judge_numerics(stage: Stage) -> Gate:
         {"ran_to_end": summary["ran_to_end"], **run_numbers(summary)},
         limits_of(stage),
         steps=steps["step"].to_numpy(),
+        free=read_settings(stage).mode == "collision",
         contact=contact_numbers(summary, energy),
     )
 

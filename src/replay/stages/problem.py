@@ -75,19 +75,22 @@ def contact_of(model: Model, contact: Contact) -> ContactControls | None:
     return contact_controls(model, contact)
 
 
-def chin_straps(model: Model) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
-    """The hard shell of the chin cup, and the straps from its corners to the shell, as far as the model has them."""
+def chin_straps(model: Model, player: int = 1) -> tuple[tuple[RigidSet, ...], tuple[Strap, ...]]:
+    """The hard shell of a player's chin cup, and the straps from its corners to the shell, as far as there are any."""
     if not seated_by_contact(model):
         return (), ()
-    sets, data = model.node_sets, model.info["strap"]
+    ending = "" if player == 1 else f"_{player}"
+    sets = {name: rows for name, rows in model.node_sets.items() if ending or not name.endswith("_2")}
+    sets = {name.removesuffix(ending): rows for name, rows in sets.items() if name.endswith(ending)}
+    data = model.info["players"][player - 1]["strap"] if "players" in model.info else model.info["strap"]
     straps = []
     for name in sorted(sets):
         place = name.removeprefix("strap_anchor_")
         cup = sets.get(f"chin_cup_strap_{place.rpartition('_')[2]}")
         if place != name and cup is not None:
             rows = np.array([sets[name][0], cup[0]], np.int64)
-            straps.append(Strap(f"chin_{place}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
-    shell = (RigidSet("chin_cup_shell", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
+            straps.append(Strap(f"chin_{place}{ending}", rows, data["stiffness_n_per_m"], data["damping_n_s_per_m"]))
+    shell = (RigidSet(f"chin_cup_shell{ending}", sets["chin_cup_shell"].astype(np.int64)),) if straps else ()
     return shell, tuple(straps)
 
 

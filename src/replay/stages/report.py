@@ -16,8 +16,10 @@ from replay.models import Model, read_model
 from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
-from replay.stages.frame import Stage, Workspace
+from replay.stages.frame import Stage, Workspace, stages_of
+from replay.stages.impact import replayed_model
 from replay.stages.limits import limits_of
+from replay.stages.players import ROLES
 from replay.stages.resolved import read_settings
 from replay.stages.verdict import ALL_GATE_FILES, GATE_FILES
 
@@ -26,6 +28,7 @@ _TITLES = {
     "reconstruction": "Reconstruction",
     "driver": "Driver",
     "assembly": "Head and helmet",
+    "placement": "Two players placed",
     "shake": "Helmet shake",
     "decks": "Run decks",
     "replay": "Replay",
@@ -36,6 +39,14 @@ _TITLES = {
 _DRIVEN = (
     "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
     " and facemask forces, contact work and the action of an impactor are not computed."
+)
+_NO_BODY = (
+    "The rest of the players. Two helmeted heads collide without necks and bodies, so that what follows the first"
+    " milliseconds lacks the mass and the restraint that a neck would bring."
+)
+_BODY = (
+    "Muscles. Necks and bodies are passive: joints with springs of an assumed stiffness, and no muscle that is braced"
+    " or becomes active in thirty milliseconds."
 )
 _SEAT = {
     "shared_nodes": (
@@ -107,7 +118,7 @@ def collect(stage: Stage) -> ReportInput:
         "mesh": _mesh(model),
         "cannot_show": [
             _SEAT[play.model.helmet_seat],
-            _DRIVEN,
+            *_blow(play),
             _BRAIN[play.model.brain_material],
             _MEMBRANES[play.model.membranes],
             _STRUCTURE[play.model.helmet_structure],
@@ -129,8 +140,10 @@ def collect(stage: Stage) -> ReportInput:
 def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     """What only a replay that ran to its end has."""
     measures = read_json(stage.read("measures", "measures.json"))
-    applied = skull_motion(stage, model)
-    fluid = {p.pid for p in model.parts if model.materials[p.material]["law"] == "fluid"}
+    tracked = 1 if play.collision is None else ROLES[play.collision.tracked]
+    applied = skull_motion(stage, tracked)
+    scene = replayed_model(stage)
+    fluid = {p.pid for p in scene.parts if scene.materials[p.material]["law"] == "fluid"}
     energy = _table(stage, "replay", "part_energy.csv")
     damaged = stage.made("measures", "damage_volume.csv")
     return {
@@ -140,7 +153,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "energy": _table(stage, "replay", "energy.csv"),
         "timestep": _table(stage, "replay", "timestep.csv").query("step > 0"),
         "part_energy": energy.assign(fluid=energy["pid"].isin(fluid)),
-        "contact": _contact(stage),
+        "contact": measures["contact"]["pairs"],
         "head_measures": measures["head"],
         "brain_histories": _table(stage, "replay", "brain_histories.csv"),
         "convergence_class": measures["brain_convergence_class"],
@@ -149,34 +162,43 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "action": _table(stage, "measures", "action.csv"),
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
+        "pads": measures["pads"],
+        **_collided(stage, measures),
     }
 
 
-def _contact(stage: Stage) -> list[dict[str, Any]]:
-    """Pairs of parts that touched, the one with the greatest force first; none where nothing can touch."""
-    if not stage.made("replay", "contact.csv"):
-        return []
-    table = _table(stage, "replay", "contact.csv")
-    rows = []
-    for (first, second), pair in table.groupby(["part_a", "part_b"], sort=False):
-        force = np.sqrt((pair[["force_x_N", "force_y_N", "force_z_N"]].to_numpy() ** 2).sum(axis=1))
-        last = pair.iloc[-1]
-        impulse = np.sqrt((last[["impulse_x_N_s", "impulse_y_N_s", "impulse_z_N_s"]].to_numpy(float) ** 2).sum())
-        rows.append(
-            {
-                "first": first,
-                "second": second,
-                "peak_force_N": float(force.max()),
-                "impulse_N_s": float(impulse),
-                "normal_J": float(last["normal_J"]),
-                "friction_J": float(last["friction_J"]),
-            }
-        )
-    return sorted(rows, key=lambda row: -row["peak_force_N"])
+def _collided(stage: Stage, measures: dict[str, Any]) -> dict[str, Any]:
+    """What only two players have: how they met, the force between them, and published numbers beside theirs."""
+    if not stage.made("placement", "placement.json"):
+        return {}
+    head = {entry["name"]: entry["value"] for entry in measures["head"]}
+    masses = read_json(stage.read("assembly", "mass_properties.json"))["assemblies"]
+    damage = measures["damage"]
+    return {
+        "scene": stage.read("placement", "preview.png").read_bytes(),
+        "blow": _table(stage, "measures", "blow_force.csv") if stage.made("measures", "blow_force.csv") else None,
+        "published": {
+            "closing_speed_m_per_s": read_json(stage.read("placement", "placement.json"))["closing_speed_m_per_s"],
+            **{name: head[name] for name in head if name.startswith("peak_")},
+            "crossover_time_s": measures["action"]["crossover_time_s"],
+            "head_action_J_s": measures["action"]["head"],
+            "damage_onset_s": damage["brain"]["onset_phi_0.001_s"] if damage else None,
+            "head_mass_kg": masses["head"]["mass_kg"],
+            "helmet_mass_kg": masses["helmet"]["mass_kg"],
+        },
+    }
 
 
 def _table(stage: Stage, name: str, file: str) -> pd.DataFrame:
     return pd.read_csv(stage.read(name, file))
+
+
+def _blow(play: Play) -> list[str]:
+    """What the way in which the head is struck cannot show."""
+    if play.collision is None:
+        return [_DRIVEN]
+    bodies = [play.collision.player(role).body for role in ROLES]
+    return [_BODY] * any(bodies) + [_NO_BODY] * (not all(bodies))
 
 
 def _play_facts(play: Play, quality: dict[str, Any], worn: Mapping[str, str]) -> dict[str, Any]:
@@ -207,7 +229,8 @@ def _gates(stage: Stage, limits: Limits) -> list[Any]:
 
 def _stages(stage: Stage) -> list[dict[str, str]]:
     rows = []
-    for name, title in _TITLES.items():
+    here = stages_of(stage.workspace)
+    for name, title in ((name, title) for name, title in _TITLES.items() if name in here):
         manifest = stage.manifest_of(name)
         verdicts = [
             read_json(stage.read(name, file))["verdict"] for file in GATE_FILES.get(name, ()) if stage.made(name, file)
@@ -247,6 +270,8 @@ def _table_two(stage: Stage, limits: Limits) -> list[dict[str, Any]]:
 def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
     """The article's Table 3: what was reconstructed at the start of the window, and what the model started with."""
     told = read_json(stage.read("driver", "initial_velocity.json"))
+    if stage.made("placement", "placement.json"):
+        return _two_starts(stage, told)
     return [
         {
             "item": item,
@@ -259,6 +284,23 @@ def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
             ("angular velocity", "rad/s", "omega_rad_per_s", applied.angular_velocity_rad_per_s),
         )
     ]
+
+
+def _two_starts(stage: Stage, told: dict[str, Any]) -> list[dict[str, Any]]:
+    """Table 3 of two players; the reconstruction shows one of them."""
+    collision = read_settings(stage).collision
+    players = read_json(stage.read("placement", "placement.json"))["players"]
+    rows = []
+    for role, start in players.items():
+        seen = collision is not None and role == collision.tracked
+        axis = np.array(start["Q_global_m"]) - np.array(start["P_global_m"])
+        omega = start["omega_rad_per_s"] * axis / np.sqrt(axis @ axis)
+        for item, unit, key, applied in (
+            (f"velocity of the {role}", "m/s", "velocity_m_per_s", start["velocity_m_per_s"]),
+            (f"angular velocity of the {role}", "rad/s", "omega_rad_per_s", omega.tolist()),
+        ):
+            rows.append({"item": item, "unit": unit, "reconstruction": told[key] if seen else None, "applied": applied})
+    return rows
 
 
 def _columns(motion: Motion) -> pd.DataFrame:
@@ -320,13 +362,16 @@ def _parameters(model: Model) -> list[dict[str, Any]]:
 
 
 def _mesh(model: Model) -> MeshView:
+    """Head and helmet, without the body that they may hang on."""
     roles = np.array([part.role for part in model.parts])
-    return MeshView(model.nodes, model.hexes, roles[model.element_part])
+    shown = ~model.elements_of(assembly="body")
+    return MeshView(model.nodes, model.hexes[shown], roles[model.element_part[shown]])
 
 
 def _snapshots(stage: Stage, model: Model) -> Snapshots:
     time, ids, values = read_snapshots(stage.read("replay", "brain_snapshots.h5"))
-    row = {int(number): k for k, number in enumerate(model.element_ids)}
+    shown = model.element_ids[~model.elements_of(assembly="body")]
+    row = {int(number): k for k, number in enumerate(shown)}
     return Snapshots(time, np.array([row[int(i)] for i in ids]), values)
 
 

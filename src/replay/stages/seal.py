@@ -7,7 +7,7 @@ from pathlib import Path
 from replay.bundle import seal, verify
 from replay.files import read_json
 from replay.manifest import NAME
-from replay.stages.frame import STAGES, Workspace, check_stage
+from replay.stages.frame import Workspace, check_stage, stages_of
 
 
 def run(workspace: Workspace, *, interrupted: bool = False) -> str | None:
@@ -26,8 +26,9 @@ def run(workspace: Workspace, *, interrupted: bool = False) -> str | None:
         When a stage is missing: a play that was stopped has the manifests of its skipped stages, so a bundle
         without one would hide something.
     """
-    unfinished = [stage for stage in STAGES if interrupted and not (workspace.folder(stage) / NAME).is_file()]
-    for stage in STAGES:
+    stages = stages_of(workspace)
+    unfinished = [stage for stage in stages if interrupted and not (workspace.folder(stage) / NAME).is_file()]
+    for stage in stages:
         if stage not in unfinished:
             check_stage(workspace, stage)
     destination = workspace.folder("bundle") / f"{workspace.play}.zip"

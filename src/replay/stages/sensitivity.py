@@ -10,7 +10,7 @@ from replay.files import write_json
 from replay.gates import hourglass_sensitivity_gate
 from replay.measures import regional_summary
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import UNFINISHED, run_driven
+from replay.stages.impact import BEFORE_A_RUN, UNFINISHED, run_play
 from replay.stages.limits import limits_of
 
 _FACTOR = 0.5
@@ -21,10 +21,10 @@ def run(workspace: Workspace, *, threads: int | None = None, checkpoint_every_s:
 
     The energy ledger cannot see a soft tissue that hourglass control holds; this run can.
     """
-    stage = Stage(workspace, "sensitivity", after=["settings", "assembly", "driver", "replay"], keep=UNFINISHED)
+    stage = Stage(workspace, "sensitivity", after=[*BEFORE_A_RUN, "replay"], keep=UNFINISHED)
     if stage.stopped_by:
         return stage.skip()
-    refusal = run_driven(stage, threads=threads, checkpoint_every_s=checkpoint_every_s, hourglass_factor=_FACTOR)
+    refusal = run_play(stage, threads=threads, checkpoint_every_s=checkpoint_every_s, hourglass_factor=_FACTOR)
     if refusal:
         return refusal
     whole = regional_summary(pd.read_csv(stage.read("replay", "brain_histories.csv")))

@@ -14,7 +14,7 @@ from replay import models
 from replay.errors import InputError
 from replay.files import read_json, write_text
 from replay.gates import Gate, Limits, read_gate
-from replay.motion import synthesise
+from replay.motion import Kinematics, synthesise
 from replay.motion.digitise import digitise, digitising_report, write_digitised
 from replay.motion.synthetic import (
     TEN,
@@ -28,12 +28,16 @@ from replay.motion.synthetic import (
     film,
     footage_play,
 )
+from replay.motion.synthetic.headform import headform_record
 from replay.motion.tracking import Following
 from replay.play import load_play, play_schema_text
 from replay.stages.player import add_body
 from replay.stages.verdict import ALL_GATE_FILES
 
 _COLOURS = {"pass": "32", "warn": "33", "fail": "31", "not reached": "90"}
+
+
+_HEADFORM_SEED = 20240911
 
 
 def show_verdict(results: Path) -> int:
@@ -48,7 +52,8 @@ def show_verdict(results: Path) -> int:
     if not path.is_file():
         raise InputError(path, "there is no verdict here", mend=f"run `make run PLAY={results.name}` first")
     verdict = read_json(path)
-    limits = Limits.load()
+    collision = read_json(results / "settings" / "play.json").get("collision")
+    limits = Limits.load(mode="collision" if collision else "driver")
     found: dict[str, Gate] = {}
     for stage, files in ALL_GATE_FILES.items():
         for file in files:
@@ -142,6 +147,17 @@ def _background(distance_m: float, focal_px: float) -> dict[str, tuple[float, fl
         "S2": (350.0 * reach, 2.0 * distance_m, 250.0 * reach),
         "S3": (100.0 * reach, 2.0 * distance_m, -300.0 * reach),
     }
+
+
+def write_headform_record(motion: Path | None, into: Path, seed: int | None) -> int:
+    """Write ``headform.csv`` of a recorded motion, such as the ``head_motion.csv`` of a replay."""
+    if motion is None:
+        raise InputError(into, "no motion is given", expected="--motion KINEMATICS.csv", mend="name a head_motion.csv")
+    write_text(
+        into / "headform.csv", headform_record(Kinematics.read(motion), _HEADFORM_SEED if seed is None else seed)
+    )
+    print(f"{into / 'headform.csv'}: the record of a headform that made the motion of {motion}")
+    return 0
 
 
 def digitise_video(

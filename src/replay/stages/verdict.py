@@ -8,13 +8,14 @@ from replay.bundle import package_facts
 from replay.files import write_json
 from replay.gates import Gate, PlayVerdict, package_gate, play_verdict, read_gate
 from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
-from replay.stages.frame import Stage, Workspace
+from replay.stages.frame import STAGES, Stage, Workspace
 from replay.stages.limits import limits_of
 from replay.stages.resolved import read_settings
 
 GATE_FILES = {
     "reconstruction": ("gate.json",),
     "assembly": ("gate_helmet.json", "gate.json"),
+    "placement": ("gate.json",),
     "shake": ("gate.json",),
     "replay": ("gate.json",),
     "sensitivity": ("gate.json",),
@@ -22,7 +23,6 @@ GATE_FILES = {
 }
 ALL_GATE_FILES = {**GATE_FILES, "verdict": ("gate.json",)}
 """With the package gate, which the verdict stage judges itself."""
-_AFTER = ("settings", "reconstruction", "assembly", "decks", "shake", "replay", "sensitivity", "fidelity", "measures")
 
 
 def collect(stage: Stage) -> list[Gate]:
@@ -32,7 +32,7 @@ def collect(stage: Stage) -> list[Gate]:
         read_gate(stage.read(name, file), limits)
         for name, files in GATE_FILES.items()
         for file in files
-        if stage.manifest_of(name).artifact(file)
+        if stage.made(name, file)
     ]
 
 
@@ -47,7 +47,7 @@ def package(stage: Stage) -> Gate:
 
 def run(workspace: Workspace) -> str | None:
     """Collect the gates, judge the package of a play that ran to its end, and write ``verdict.json``."""
-    stage = Stage(workspace, "verdict", after=_AFTER)
+    stage = Stage(workspace, "verdict", after=STAGES[: STAGES.index("verdict")])
     gates = collect(stage)
     if not stage.stopped_by:
         gates.append(package(stage))

@@ -1,0 +1,63 @@
+"""What two players show beyond a driven head: how they met, the force between them, and how far pads went."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from replay.report.charts import TIME_LABEL
+from replay.report.figure import BLACK, CYCLE, DASHES, Picture, finish, house_style, legend_below, new_figure
+from replay.report.markup import figure, number, table, text
+from replay.report.model import ReportInput
+
+_MOST_PADS = 12
+
+
+def collision_figures(report: ReportInput, pictures: list[Picture]) -> str:
+    """Return the picture of the scene (article, Figure 5) and the chart of the blow."""
+    drawn = []
+    if report.scene is not None:
+        alt = "Both helmeted heads at first contact, from outside, and the struck one cut open."
+        caption = "First contact: one millimetre is left between the players (article, Figure 5)."
+        drawn.append(Picture("first_contact", "png", report.scene, alt, caption))
+    if report.blow is not None:
+        drawn.append(blow_chart(report.blow))
+    pictures.extend(drawn)
+    return f'<div class="figures">{"".join(figure(picture) for picture in drawn)}</div>' if drawn else ""
+
+
+def blow_chart(blow: pd.DataFrame) -> Picture:
+    """Force of the impactor on the struck player, components and resultant."""
+    with house_style():
+        drawing, (axes,) = new_figure()
+        t = 1e3 * blow["time_s"].to_numpy(dtype=float)
+        for axis, colour, dash in zip("xyz", CYCLE, DASHES):
+            axes.plot(t, 1e-3 * blow[f"force_{axis}_N"], color=colour, ls=dash, lw=1.1, label=axis)
+        axes.plot(t, 1e-3 * blow["force_N"], color=BLACK, lw=1.8, label="resultant")
+        axes.set(xlabel=TIME_LABEL, ylabel="force (kN)", title="Force of the impactor on the struck player")
+        legend_below(axes, 4)
+        at = int(blow["force_N"].to_numpy().argmax())
+        alt = f"The contact force peaks at {1e-3 * blow['force_N'].iloc[at]:.4g} kN at {t[at]:.3g} ms."
+        caption = "Sum over all pairs of parts of the two players, mean over each history interval."
+        return finish(drawing, "blow_force", alt, caption)
+
+
+def pads_table(report: ReportInput) -> str:
+    """Return how far the most compressed pads went."""
+    if not report.pads:
+        return ""
+    rows = [
+        [
+            text(str(pad["part"]).replace("_", " ")),
+            number(100.0 * pad["compression_mean"], 3),
+            number(1e3 * pad["time_s"], 3),
+            number(100.0 * pad["compression_max"], 3),
+        ]
+        for pad in report.pads[:_MOST_PADS]
+    ]
+    return table(
+        "Compression of the pads",
+        ["Pad", "Whole pad (%)", "at (ms)", "Worst element (%)"],
+        rows,
+        numeric=(1, 2, 3),
+        note="1 − V / V₀: the foam crushes without widening. Parts that end in 2 are the impactor's.",
+    )
