@@ -13,10 +13,10 @@ from replay.models import Model, read_model
 from replay.motion import Kinematics
 from replay.play import Play, estimate
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import replayed_model
 from replay.stages.own_deck import model_facts, node_sets, region_sets
 from replay.stages.players import PLAYER_SETS
 from replay.stages.problem import chin_straps, seated_by_contact
+from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
 
 # Numbers of the two stabilisations in the article's solver; its protocol uses 4.

@@ -9,9 +9,9 @@ from replay.gates import fidelity_gate
 from replay.measures import Motion, fidelity
 from replay.motion import DRIVER
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import replayed_model
 from replay.stages.limits import limits_of
 from replay.stages.players import ROLES
+from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
 
 

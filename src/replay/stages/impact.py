@@ -10,15 +10,15 @@ from replay.errors import InstabilityError, ResumeError
 from replay.files import read_json
 from replay.gates import Gate, numerics_gate, part_energies
 from replay.measures import BrainRecorder, DamageRecorder, PadRecorder
-from replay.models import Model, read_model
+from replay.models import Model
 from replay.motion import Kinematics
 from replay.solver import Problem, Recorder, solve
 from replay.stages.collision import collision_problem
 from replay.stages.contact import contact_numbers
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
-from replay.stages.placement import SCENE
 from replay.stages.problem import controls_of, driven_problem
+from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
 
 RUN_FILES = {
@@ -91,13 +91,6 @@ def run_play(
         recorders.append(damage_recorder(model))
         files |= DAMAGE_FILES
     return run_solver(stage, problem, recorders, files, threads=threads)
-
-
-def replayed_model(stage: Stage) -> Model:
-    """The model that is replayed: the assembled one, or the scene of two players."""
-    if stage.made("placement", SCENE):
-        return read_model(stage.read("placement", SCENE))
-    return read_model(stage.read("assembly", "model.h5"))
 
 
 def run_solver(

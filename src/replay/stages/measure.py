@@ -24,8 +24,8 @@ from replay.motion import Kinematics
 from replay.stages.fidelity import skull_motion
 from replay.stages.forces import forces
 from replay.stages.frame import Stage, Workspace
-from replay.stages.impact import replayed_model
 from replay.stages.limits import limits_of
+from replay.stages.replayed import replayed_model
 
 _DRIVEN = "a driven head has no impactor: the crossover is that of head and helmet"
 _COLLISION = "the impactor is all of the striking player; the crossover is that of the struck head and the impactor"

@@ -22,9 +22,9 @@ from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
 from replay.stages.players import ROLES, PlayerStart
 from replay.stages.problem import controls_of
+from replay.stages.replayed import SCENE
 from replay.stages.resolved import read_settings
 
-SCENE = "scene.h5"
 MODELS = {"struck": "model.h5", "impactor": "impactor.h5"}
 """Files of the assembly stage."""
 _PLAY = "play.yaml"

@@ -17,9 +17,9 @@ from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace, stages_of
-from replay.stages.impact import replayed_model
 from replay.stages.limits import limits_of
 from replay.stages.players import ROLES
+from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
 from replay.stages.verdict import ALL_GATE_FILES, GATE_FILES
 
