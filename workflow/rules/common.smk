@@ -162,6 +162,21 @@ def evidence(*more):
     return manifests
 
 
+def helmet_files(wildcards):
+    """The stage that copied the files which describe a play's helmet, where there are any."""
+    member = member_of(wildcards.play)
+    settings = overridden(
+        said(wildcards.play.partition(".")[0]), member.overrides if member else {}
+    )
+    model = settings.get("model")
+    named = [model.get(piece) for piece in PIECES] if isinstance(model, dict) else []
+    if any(
+        isinstance(name, str) and name.endswith((".yaml", ".yml")) for name in named
+    ):
+        return of("inputs")(wildcards)
+    return []
+
+
 # Every stage before the verdict. What reads them all names them all: a stage whose files were removed is run again.
 EVIDENCE = (
     "settings",

@@ -4,7 +4,7 @@
 rule assemble:
     input:
         settings=stage("settings"),
-        inputs=of("inputs"),
+        helmet=helmet_files,
         code=code("assemble"),
     output:
         stage("assembly"),

@@ -16,7 +16,7 @@ from replay.manifest import NAME
 from replay.play import ADDRESS
 from replay.report import ensemble_rows, season_page
 from replay.stages.bands import BANDS
-from replay.stages.frame import COMMANDS
+from replay.stages.frame import COMMANDS, Workspace, stages_of
 from replay.stages.table import PLAYS, maybe, row_of
 from replay.tables import TableFormat
 
@@ -71,7 +71,9 @@ def season(plays: Sequence[str], results: Path) -> int:
 def _row(play: str, results: Path) -> dict[str, Any]:
     folder = results / play
     bundle = folder / "bundle" / f"{play}.zip"
-    unfinished = [stage for stage in COMMANDS if not (folder / stage / NAME).is_file()]
+    # a driven play has no placement
+    asked = [stage for stage in COMMANDS if stage in stages_of(Workspace(play, results=results))]
+    unfinished = [stage for stage in asked if not (folder / stage / NAME).is_file()]
     if bundle.is_file() and not unfinished:
         found = row_of(bundle)
         found |= {"bundle": bundle.relative_to(results).as_posix(), **_band(folder)}
