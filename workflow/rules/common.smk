@@ -162,13 +162,17 @@ def evidence(*more):
     return manifests
 
 
+def settings_of(address):
+    """What the description of a play says, with what a member of an ensemble replaces; unchecked."""
+    member = member_of(address)
+    return overridden(
+        said(address.partition(".")[0]), member.overrides if member else {}
+    )
+
+
 def helmet_files(wildcards):
     """The stage that copied the files which describe a play's helmet, where there are any."""
-    member = member_of(wildcards.play)
-    settings = overridden(
-        said(wildcards.play.partition(".")[0]), member.overrides if member else {}
-    )
-    model = settings.get("model")
+    model = settings_of(wildcards.play).get("model")
     named = [model.get(piece) for piece in PIECES] if isinstance(model, dict) else []
     if any(
         isinstance(name, str) and name.endswith((".yaml", ".yml")) for name in named
@@ -198,9 +202,7 @@ SEASON = tuple(ROWS) or tuple(config["plays"])
 @cache
 def asks(address):
     """Estimate of one replay of a play or member."""
-    member = member_of(address)
-    play = address.partition(".")[0]
-    settings = overridden(said(play), member.overrides if member else {})
+    settings = settings_of(address)
     model, window = settings.get("model") or {}, settings.get("window") or {}
     resolution = config.get("resolution")
     if not resolution and isinstance(model, dict):

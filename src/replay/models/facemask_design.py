@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from replay.documents import Number, Setting, refuse
+from replay.play import Positive
 
 BROW = "brow"
 """End of a span that runs to the brow's edge."""
-_Positive = Annotated[Number, Field(gt=0)]
 
 
 class Mount(Setting):
@@ -54,12 +54,12 @@ class Facemask(Setting):
     title: str = Field(description="What it is.", min_length=1)
     source: str = Field(description="Where its numbers come from.", min_length=1)
     certainty: dict[str, Literal["measured", "calibrated", "assumed", "article"]]
-    mass_kg: _Positive = Field(description="Mass on the `nfl` head [kg].")
+    mass_kg: Positive = Field(description="Mass on the `nfl` head [kg].")
     material: Literal["titanium"] = Field(description="Material of the bars.")
     pid: Annotated[int, Field(gt=0, lt=10_000_000)] = 2
     bar_m: Annotated[Number, Field(gt=0.002, lt=0.02)] = Field(description="Side of a bar's section [m].")
-    mount_deg: _Positive = Field(description="Length of a mount between the shell's edge and a bar [degrees].")
-    smoothing_deg: _Positive = Field(description="Smoothing of the scalp before which the bars lie [degrees].")
+    mount_deg: Positive = Field(description="Length of a mount between the shell's edge and a bar [degrees].")
+    smoothing_deg: Positive = Field(description="Smoothing of the scalp before which the bars lie [degrees].")
     standoff_m: Annotated[Number, Field(ge=0)] = Field(description="Of the middle beyond the shell's surface [m].")
     mounts: dict[str, Mount] = Field(description="Mounts of the left side; the right side is their image.")
     rows: dict[str, Row] = Field(description="Bars across, from the lowest up.", min_length=2)

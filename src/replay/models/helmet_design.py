@@ -19,9 +19,9 @@ from replay.documents import Number, Setting, load_yaml, refuse
 from replay.errors import InputError
 from replay.models.facemask_design import Facemask
 from replay.models.materials import CERTAINTIES, load_materials
+from replay.play import Positive
 
 SettingT = TypeVar("SettingT", bound=Setting)
-Positive = Annotated[Number, Field(gt=0)]
 Pair = tuple[Number, Number]
 PartNumber = Annotated[int, Field(gt=0, lt=10_000_000, description="Part number within the helmet's block.")]
 

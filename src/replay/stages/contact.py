@@ -12,7 +12,7 @@ from replay.files import read_json
 from replay.gates import Limits
 from replay.gates.model import Judge
 from replay.gates.numerics import CONTACT_CHECKS
-from replay.play import ContactSettings
+from replay.play import ContactSettings, FrictionPair
 from replay.solver import ContactControls, ContactPair
 
 _SIDES = ("first", "second")
@@ -40,6 +40,15 @@ def part_numbers(model: Parted, name: str) -> tuple[int, ...]:
         present = {part.pid for part in model.parts}
         return tuple(pid for pid in model.part_sets[name] if pid in present)
     return tuple(part.pid for part in model.parts if part.name == name)
+
+
+def pairs_without_a_side(model: Parted, pairs: Sequence[FrictionPair]) -> list[str]:
+    """Pairs of which the model lacks a side, ``first-second``."""
+    return [
+        f"{pair.first}-{pair.second}"
+        for pair in pairs
+        if not (part_numbers(model, pair.first) and part_numbers(model, pair.second))
+    ]
 
 
 def unresolved_names(model: Parted, contact: ContactSettings) -> list[tuple[str, str]]:

@@ -74,8 +74,9 @@ class Finished:
 
     def __init__(self, workspace: Workspace, stages: Sequence[str]) -> None:
         self.workspace = workspace
+        here = stages_of(workspace)
         self._before: dict[str, StageManifest] = {
-            stage: check_stage(workspace, stage) for stage in stages if stage in stages_of(workspace)
+            stage: check_stage(workspace, stage) for stage in stages if stage in here
         }
         self._inputs: dict[str, Path] = {}
 

@@ -17,7 +17,7 @@ from replay.models.model import GRID_DECIMALS
 from replay.play import Collision
 from replay.solver import PENETRATION_TABLE, penetration_table, seat
 from replay.stages.collision import scene_at_rest
-from replay.stages.contact import part_numbers
+from replay.stages.contact import pairs_without_a_side
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
 from replay.stages.players import ROLES, PlayerStart
@@ -57,11 +57,7 @@ def run(workspace: Workspace) -> str | None:
         f"placement: {1e3 * found.gap_m:.3f} mm between {report['first_contact']['struck_part']} and "
         f"{report['first_contact']['impactor_part']}, closing at {report['closing_speed_m_per_s']:.3f} m/s"
     )
-    wrong = [
-        f"{pair.first}-{pair.second}"
-        for pair in play.collision.pairs
-        if not (part_numbers(scene, pair.first) and part_numbers(scene, pair.second))
-    ]
+    wrong = pairs_without_a_side(scene, play.collision.pairs)
     outside = parts_outside_block(scene)
     numbers = [scene.node_ids, scene.element_ids, np.array([part.pid for part in scene.parts])]
     gate = placement_gate(

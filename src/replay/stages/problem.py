@@ -21,7 +21,7 @@ from replay.solver import (
     SolverPart,
     Strap,
 )
-from replay.stages.contact import contact_controls, part_numbers
+from replay.stages.contact import contact_controls, pairs_without_a_side, part_numbers
 
 
 def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hourglass_factor: float = 1.0) -> Controls:
@@ -55,12 +55,9 @@ def controls_of(play: Play, duration_s: float, *, checkpoint_every_s: float, hou
 
 def unresolved_pairs(model: Model, contact: Contact) -> list[str]:
     """Friction pairs, and names of self-contact, of which the model lacks a side."""
-    pairs = [
-        f"{pair.first}-{pair.second}"
-        for pair in contact.pairs
-        if not (part_numbers(model, pair.first) and part_numbers(model, pair.second))
+    return pairs_without_a_side(model, contact.pairs) + [
+        name for name in contact.self_contact if not part_numbers(model, name)
     ]
-    return pairs + [name for name in contact.self_contact if not part_numbers(model, name)]
 
 
 def seated_by_contact(model: Model) -> bool:

@@ -71,18 +71,17 @@ def season(plays: Sequence[str], results: Path) -> int:
 def _row(play: str, results: Path) -> dict[str, Any]:
     folder = results / play
     bundle = folder / "bundle" / f"{play}.zip"
-    # a driven play has no placement
-    asked = [stage for stage in COMMANDS if stage in stages_of(Workspace(play, results=results))]
+    asked = stages_of(Workspace(play, results=results))
     unfinished = [stage for stage in asked if not (folder / stage / NAME).is_file()]
     if bundle.is_file() and not unfinished:
         found = row_of(bundle)
         found |= {"bundle": bundle.relative_to(results).as_posix(), **_band(folder)}
     else:
-        found = {"bundle": f"{play}/bundle/{play}.zip", "play": play, **_failure(play, results, unfinished)}
+        found = {"bundle": f"{play}/bundle/{play}.zip", "play": play, **_failure(play, results, asked, unfinished)}
     return found | cost_of(folder / "logs")
 
 
-def _failure(play: str, results: Path, unfinished: Sequence[str]) -> dict[str, Any]:
+def _failure(play: str, results: Path, asked: Sequence[str], unfinished: Sequence[str]) -> dict[str, Any]:
     """What the log of the first stage that did not finish ends with."""
     logs = [results / play / "logs" / "write_out.log"] if "settings" in unfinished else []
     logs += [results / play / "logs" / f"{COMMANDS[stage]}.log" for stage in unfinished]
@@ -95,7 +94,7 @@ def _failure(play: str, results: Path, unfinished: Sequence[str]) -> dict[str, A
             reason = said[1] if said else "; ".join(text.splitlines()[-_LAST_LINES:])
             where = log.relative_to(results).as_posix()
             return {"verdict": FAILED, "reason": "; ".join(line.strip() for line in reason.splitlines()), "log": where}
-    came = [stage for stage in COMMANDS if stage not in unfinished]
+    came = [stage for stage in asked if stage not in unfinished]
     return {
         "verdict": NOT_RUN,
         "reason": f"not finished; came to stage {came[-1]}" if came else "nothing of it has run",
