@@ -184,7 +184,10 @@ class Integrator:
         """Velocities at the present time, from those half a step before and, after `kick`, half a step past it."""
         share = self.dt_s / (self.dt_s + dt_next)
         self._body_velocity = self._body_velocity_before + share * (self.bodies.velocity - self._body_velocity_before)
-        return before + share * (self.nodal[:, VELOCITY : VELOCITY + 3] - before)
+        after = self.velocities()
+        if self.contact is not None:
+            self.contact.without_corrections(after)
+        return before + share * (after - before)
 
     def mean_body_velocity(self, body: int) -> NDArray[np.float64]:
         """Velocity of a free body's centre at the present time, after `present_velocities` [m/s]."""

@@ -239,6 +239,16 @@ class Contact:
                 forces.slot, self.sums,
             )  # fmt: skip
 
+    def without_corrections(self, velocities: NDArray[np.float64]) -> None:
+        """Take this step's corrections of penetration off velocities after the kick: they carry nothing.
+
+        Parameters
+        ----------
+        velocities : (n, 3) float64
+            In the solver's order (updated).
+        """
+        velocities[self.surface.nodes] -= self._shift
+
     def summary(self) -> dict[str, float]:
         """How contact went so far, for ``run.json``."""
         return {
