@@ -9,8 +9,11 @@ import pytest
 
 from replay.errors import InputError, InputErrors
 from replay.models import Model, assembly_inspection, assembly_mass, build_model, load_design, second_player
+from replay.models.cubed_sphere import cube_lattice
 from replay.models.helmet_design import NO_FACEMASK, shipped
+from replay.models.helmet_layout import helmet_layout
 from replay.models.inspection import missing_interfaces
+from replay.models.ogrid import RESOLUTIONS
 from replay.models.quality import aspect_ratios, hex_volumes, scaled_jacobians
 
 DATA = Path(__file__).parents[2] / "src" / "replay" / "models" / "data"
@@ -86,6 +89,26 @@ def test_each_pad_is_as_thick_as_its_own_file_says(tmp_path: Path) -> None:
     assert thickness["own", "front"][1] == pytest.approx(thickness["classic", "front"][1], rel=1e-3)
 
 
+@pytest.mark.parametrize("resolution", ["tiny", "coarse"])
+def test_jaw_pads_go_on_from_the_side_pads_and_all_others_stand_apart(resolution: str) -> None:
+    model = build_model("nfl", resolution)
+    pads = [part.name for part in model.parts if part.role == "energy_pad"]
+    nodes = {name: set(model.hexes[model.element_part == model.part_index(name)].ravel().tolist()) for name in pads}
+    touching = {(a, b) for a in pads for b in pads if a < b and nodes[a] & nodes[b]}
+    assert touching == {(f"energy_pad_jaw_{side}", f"energy_pad_side_{side}") for side in ("left", "right")}
+
+
+def test_no_pad_lies_on_the_ear_or_under_it() -> None:
+    ear = load_design().shell.ear
+    assert ear is not None
+    layout = helmet_layout(lattice := cube_lattice(RESOLUTIONS["coarse"].divisions), load_design())
+    x, y, z = lattice.quad_centres.T
+    under = (abs(y) == 1) & (x >= ear.x[0]) & (x <= ear.x[1]) & (z <= ear.z[1]) & layout.covered
+    assert under.sum() == 8, "two columns of each side, of the opening and of the shell below it"
+    assert (layout.pad[under] == -1).all()
+    assert layout.shell[under].sum() == 4, "the shell closes below the opening"
+
+
 def test_routings_move_the_anchors_of_the_chin_strap() -> None:
     height = {}
     for name in shipped("chinstrap"):
@@ -135,6 +158,8 @@ def test_an_unknown_name_is_refused_with_those_there_are(tmp_path: Path, kind: s
         ("pads", "pads", ("comfort_m: 0.010", "comfort_m: 0.040"), "5 mm less than the helmet's stand-off of 38 mm"),
         ("pads", "pads", ("comfort_pid: 176", "comfort_pid: 175"), "part number 175 is given twice"),
         ("pads", "pads", ("face: back,", "face: back, energy_material: straw,"), "pad back is of 'straw'"),
+        ("pads", "pads", ("continues: side_left", "continues: cheek"), "pad jaw_left continues 'cheek'"),
+        ("pads", "pads", ("face: front, comfort_m", "face: front, continues: back, comfort_m"), "described before it"),
         ("helmet", "helmets", ("[62.0, 4.0], [64.0, -16.0]", "[61.0, 4.0], [64.0, -16.0]"), "the edge has a gap"),
         ("helmet", "helmets", ("shell_m: 0.005", "shell_thickness: 5"), "shell_thickness"),
         ("chinstrap", "chinstraps", ("stiffness_n_per_m: 40.0e+3", "stiffness_n_per_m: -1"), "out of range"),

@@ -116,7 +116,7 @@ def helmet_mesh(
 
 
 def _comfort_m(lattice: CubeLattice, layout: HelmetLayout, design: HelmetDesign) -> np.ndarray:
-    """Thickness of the comfort pad at each surface point, (s,) [m]; no two pads share a point."""
+    """Thickness of the comfort pad at each surface point, (s,) [m]; pads that share one are as thick."""
     thickness = np.full(len(layout.directions), min(pad.comfort_m for pad in design.pads.pads.values()))
     for index, pad in enumerate(design.pads.pads.values()):
         thickness[lattice.quads[layout.pad == index]] = pad.comfort_m

@@ -149,6 +149,9 @@ class Pad(Setting):
     y: Pair = Field(default=(-1.0, 1.0), description="Lattice coordinates to the left.")
     z: Pair = Field(default=(-1.0, 1.0), description="Lattice coordinates up.")
     comfort_m: Positive = Field(description="Thickness of the comfort pad; the energy pad fills up to the shell [m].")
+    continues: str | None = Field(
+        default=None, description="Name of an earlier pad, as thick, that this one goes on from without a gap."
+    )
     comfort_pid: PartNumber
     energy_pid: PartNumber
     comfort_material: str = Field(default="comfort_foam", description="Material of the comfort pad.")
@@ -156,7 +159,7 @@ class Pad(Setting):
 
 
 class PadSet(Described):
-    """The pads of a helmet; where two would touch, the later one gives way by a row of cells."""
+    """The pads of a helmet; where two would touch, the later one gives way by a row of cells, or continues it."""
 
     materials: dict[str, Foam] = Field(default_factory=dict, description="Foams beside those of the library.")
     pads: dict[Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$")], Pad] = Field(description="By name.", min_length=1)
@@ -168,6 +171,19 @@ class PadSet(Described):
             for material in (pad.comfort_material, pad.energy_material):
                 if known and (material not in known or material in _STRUCTURE_MATERIALS):
                     refuse(f"pad {name} is of {material!r}", "a foam", "describe the foam under `materials:`")
+        return self
+
+    @model_validator(mode="after")
+    def _continued_are_before(self) -> PadSet:
+        before: dict[str, float] = {}
+        for name, pad in self.pads.items():
+            if pad.continues is not None and before.get(pad.continues) != pad.comfort_m:
+                refuse(
+                    f"pad {name} continues {pad.continues!r}",
+                    f"a pad described before it whose comfort pad is {1e3 * pad.comfort_m:.3g} mm thick as well",
+                    "correct the name or the thickness, or leave a gap between them",
+                )
+            before[name] = pad.comfort_m
         return self
 
 

@@ -50,7 +50,8 @@ def helmet_layout(lattice: CubeLattice, design: HelmetDesign) -> HelmetLayout:
     open_ear = _opening(lattice, covered, design.shell.ear)
     if open_ear.any():
         directions = _rounded(lattice, open_ear, directions, covered)
-    pad = np.where(covered & ~open_ear, _pad_zones(lattice, design.pads), -1)
+    bare = _under(lattice, open_ear, design.shell.ear)
+    pad = np.where(covered & ~bare, _pad_zones(lattice, design.pads), -1)
     return HelmetLayout(covered, covered & ~open_ear, pad, _chin(lattice, design.chinstrap.cup), directions)
 
 
@@ -82,17 +83,20 @@ def _covered(centres: np.ndarray, shell: HelmetShell) -> np.ndarray:
 
 
 def _pad_zones(lattice: CubeLattice, pads: PadSet) -> np.ndarray:
-    """Pad of each quad; of two that would share a node the later one gives way."""
-    centres = lattice.quad_centres
-    pad, taken = np.full(len(centres), -1), np.zeros(len(lattice.surface), dtype=bool)
+    """Pad of each quad; of two that would share a node the later one gives way, unless it continues the other."""
+    centres, names = lattice.quad_centres, list(pads.pads)
+    pad = np.full(len(centres), -1)
     for index, zone in enumerate(pads.pads.values()):
         axis, end = _FACES[zone.face]
         here = centres[:, axis] == end
         for value, (low, high) in zip(centres.T, (zone.x, zone.y, zone.z)):
             here &= (value >= low) & (value <= high)
-        here &= ~taken[lattice.quads].any(axis=1)
-        pad[here] = index
-        taken[lattice.quads[here]] = True
+        others = pad >= 0
+        if zone.continues is not None:
+            others &= pad != names.index(zone.continues)
+        taken = np.zeros(len(lattice.surface), dtype=bool)
+        taken[lattice.quads[others]] = True
+        pad[here & (pad < 0) & ~taken[lattice.quads].any(axis=1)] = index
     return pad
 
 
@@ -105,6 +109,14 @@ def _opening(lattice: CubeLattice, covered: np.ndarray, ear: Opening | None) -> 
     at_edge = np.zeros(len(lattice.surface), dtype=bool)
     at_edge[boundary_edges(lattice.quads[covered])] = True
     return chosen & ~at_edge[lattice.quads[chosen]].any()
+
+
+def _under(lattice: CubeLattice, open_ear: np.ndarray, ear: Opening | None) -> np.ndarray:
+    """Quads of the openings over the ears and below them: no pad is a bridge under the ear, one row of cells wide."""
+    if ear is None or not open_ear.any():
+        return open_ear
+    x, y, z = lattice.quad_centres.T
+    return (np.abs(y) == 1) & (x >= ear.x[0]) & (x <= ear.x[1]) & (z <= ear.z[1])
 
 
 def _chin(lattice: CubeLattice, cup: Cup) -> np.ndarray:
