@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import finished_play as example
 import numpy as np
+import pandas as pd
 import pytest
 
-from replay.report.head_view import _spread, section, strain_picture, surface
+from replay.report.damage import damage_section
+from replay.report.figure import Picture
+from replay.report.head_view import _spread, section, sections_picture, surface
 from replay.report.markup import fixed, label, limit, number, scientific, unit
 from replay.report.model import MeshView, Snapshots
 
@@ -75,7 +80,7 @@ def test_pictures_of_strain_include_the_moment_of_greatest_strain():
 def test_few_snapshots_are_all_drawn():
     view = block()
     few = Snapshots(np.array([0.0, 1e-3]), np.arange(27), np.linspace(0, 0.2, 54).reshape(2, 27))
-    picture = strain_picture(view, few)
+    picture = sections_picture(view, few, "strain")
     assert "0.0, 1.0 ms" in picture.alt
     assert "0.0981, 0.2" in picture.alt
 
@@ -116,3 +121,20 @@ def test_limits_and_differences_are_printed_as_in_a_book():
     assert fixed(8.7e-16) == "+0.00"
     assert fixed(-7.25, 1) == "−7.2"
     assert fixed(None) == "–"
+
+
+def test_damage_is_shown_in_space_where_states_hold_it() -> None:
+    play = example.finished_play()
+    assert play.mesh is not None
+    volumes = {"volume_m3": 1e-3, "volume_phi_0.001_m3": [0.0, 2e-4], "volume_phi_0.34_m3": 0.0}
+    damage = pd.DataFrame(
+        {"time_s": [0.0, 0.01], "head_J_s": [0.0, 1.0], "region": "brain", **volumes, "phi_mean": 1e-4, "phi_max": 2e-3}
+    )
+    phi = dataclasses.replace(example.snapshots(play.mesh), name="damage variable φ")
+    drawn: dict[bool, list[Picture]] = {False: [], True: []}
+    for mapped, pictures in drawn.items():
+        html = damage_section(
+            dataclasses.replace(play, damage=damage, damage_snapshots=phi if mapped else None), pictures
+        )
+        assert ("the brain is coloured by damage variable φ" in html) is mapped
+    assert [p.name for p in drawn[True] if p not in drawn[False]] == ["brain_damage_sections"]

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from replay.report.figure import CYCLE, DASHES, Picture, finish, house_style, legend_below, new_figure
+from replay.report.head_view import sections_picture
 from replay.report.markup import absent, figure, number, table, text
 from replay.report.model import ReportInput
 
@@ -24,11 +25,15 @@ _CONSTANT = {
 
 
 def damage_section(report: ReportInput, pictures: list[Picture]) -> str:
-    """Return damaged volume by region, against time and action, and its sensitivity to assumed constants."""
+    """Return damage in space (article, Figure 6), by region against time and action, and what assumed constants do."""
     if report.damage is None:
         return absent("The brain of this run keeps no damage variable, or the replay was not run.")
     drawn = [damage_chart(report.damage, "time_s"), damage_chart(report.damage, "head_J_s")]
     pictures.extend(drawn)
+    maps = ""
+    if report.mesh is not None and report.damage_snapshots is not None:
+        pictures.append(sections_picture(report.mesh, report.damage_snapshots, "brain_damage_sections"))
+        maps = figure(pictures[-1], wide=True)
     rows = []
     for region, given in report.damage.groupby("region", sort=False):
         last = given.iloc[-1]
@@ -47,7 +52,7 @@ def damage_section(report: ReportInput, pictures: list[Picture]) -> str:
         "φ is the pore volume fraction of the brain's law (HV57): a diagnostic that the stress does not feel, and no"
         " measure of injury. Amygdala: a region of interest, not a segmentation."
     )
-    content = f'<div class="figures">{"".join(figure(picture) for picture in drawn)}</div>'
+    content = maps + f'<div class="figures">{"".join(figure(picture) for picture in drawn)}</div>'
     content += table("Damaged volume by region", [*head, "φ, mean", "φ, max"], rows, numeric=range(1, 10), note=note)
     return content + _sensitivity(report.damage_sensitivity)
 

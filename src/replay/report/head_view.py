@@ -1,4 +1,4 @@
-"""Pictures of the model: sections by role, the outer surface, and strain in the cut head."""
+"""Pictures of the model: sections by role, the outer surface, and strain and damage in the cut head."""
 
 from __future__ import annotations
 
@@ -107,8 +107,18 @@ def model_picture(mesh: MeshView) -> Picture:
         return finish(figure, "model", alt, caption, ending="png")
 
 
-def strain_picture(mesh: MeshView, snapshots: Snapshots, columns: int = 4) -> Picture:
-    """Show the head cut open at several times, the brain coloured by strain on the undeformed geometry."""
+def sections_picture(mesh: MeshView, snapshots: Snapshots, name: str, columns: int = 4) -> Picture:
+    """Show the head cut open at several times, the brain coloured by a value on the undeformed geometry.
+
+    Parameters
+    ----------
+    mesh, snapshots
+        The model, and the value of its elements.
+    name
+        File name.
+    columns
+        How many times, at most.
+    """
     chosen = _spread(snapshots, columns)
     values = np.full(len(mesh.hexes), np.nan)
     # Cut the scale at the 99.5th percentile: one bad element must not turn the rest dark.
@@ -158,11 +168,11 @@ def strain_picture(mesh: MeshView, snapshots: Snapshots, columns: int = 4) -> Pi
             "Sagittal (anterior to the right) and axial sections of the head; the brain is coloured by "
             f"{snapshots.name}, drawn on the undeformed geometry."
         )
-        return finish(figure, "brain_strain_sections", alt, caption, ending="png")
+        return finish(figure, name, alt, caption, ending="png")
 
 
 def _spread(snapshots: Snapshots, columns: int) -> list[int]:
-    """Choose snapshots from the first strain to the end, the one of greatest strain among them."""
+    """Choose snapshots from the first rise to the end, the one of the greatest value among them."""
     greatest = np.nanmax(snapshots.values, axis=1)
     count = len(snapshots.time_s)
     if count <= columns:

@@ -124,8 +124,8 @@ class ReportInput:
     parameters
         ``material``, ``parameter``, ``value``, ``unit``, ``certainty`` (measured, calibrated,
         assumed, article), ``source``.
-    mesh, snapshots
-        For the pictures of the model and of the strain.
+    mesh, snapshots, damage_snapshots
+        For the pictures of the model, of the strain and of the damage variable.
     published
         Values of a collision by the keys of ``published.yaml``; None of a driven head.
     blow
@@ -173,6 +173,7 @@ class ReportInput:
     parameters: Sequence[Row] = ()
     mesh: MeshView | None = None
     snapshots: Snapshots | None = None
+    damage_snapshots: Snapshots | None = None
     published: Mapping[str, float | None] | None = None
     blow: pd.DataFrame | None = None
     pads: Sequence[Row] = ()

@@ -8,7 +8,7 @@ from typing import Any
 from replay.report import charts
 from replay.report.article_tables import initial_conditions_table, parts_table, peaks_table, quality_table
 from replay.report.figure import Picture
-from replay.report.head_view import model_picture, strain_picture
+from replay.report.head_view import model_picture, sections_picture
 from replay.report.markup import absent, badge, figure, label, number, paragraph, table, text, unit
 from replay.report.model import ReportInput
 from replay.report.verdict_view import gate_title
@@ -183,7 +183,7 @@ def brain_section(report: ReportInput, pictures: list[Picture]) -> str:
         return _not_run(report, "The replay, and with it the brain,")
     content = _convergence_note(report)
     if report.mesh is not None and report.snapshots is not None:
-        picture = strain_picture(report.mesh, report.snapshots)
+        picture = sections_picture(report.mesh, report.snapshots, "brain_strain_sections")
         pictures.append(picture)
         content += figure(picture, wide=True)
     histories, grade = report.brain_histories, report.convergence_class

@@ -21,6 +21,7 @@ from replay.measures import (
     write_action,
 )
 from replay.motion import Kinematics
+from replay.stages.channels import peaks_behind_filters
 from replay.stages.fidelity import skull_motion
 from replay.stages.forces import forces
 from replay.stages.frame import Stage, Workspace
@@ -64,11 +65,13 @@ def run(workspace: Workspace) -> str | None:
         DAMAGE_VOLUME_TABLE.write(path, {name: found[name] for name in DAMAGE_VOLUME_TABLE.names})
         damage = damage_summary(found)
     _head_motion(stage)
+    motion = skull_motion(stage)
+    filtered = peaks_behind_filters(motion) if stage.made("placement", "placement.json") else []
     write_json(
         stage.write("measures.json", "head, brain and action measures with unit, definition and source"),
         {
             "statement": "process diagnostics; no statement on injury or on a player",
-            "head": head_measures(in_head_axes(skull_motion(stage)), file="replay/histories.csv"),
+            "head": head_measures(in_head_axes(motion), file="replay/histories.csv") + filtered,
             "brain": regional_summary(brain),
             "damage": damage,
             **forces(stage, model),

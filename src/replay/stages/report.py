@@ -15,6 +15,8 @@ from replay.measures import Motion, read_snapshots
 from replay.models import Model, read_model
 from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
+from replay.solver import read_states
+from replay.stages.channels import NAMES
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace, stages_of
 from replay.stages.limits import limits_of
@@ -162,6 +164,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "action": _table(stage, "measures", "action.csv"),
         "crossover_s": measures["action"]["crossover_time_s"],
         "snapshots": _snapshots(stage, model),
+        "damage_snapshots": _damage_snapshots(stage, model) if damaged else None,
         "pads": measures["pads"],
         **_collided(stage, measures),
     }
@@ -179,6 +182,7 @@ def _collided(stage: Stage, measures: dict[str, Any]) -> dict[str, Any]:
         "blow": _table(stage, "measures", "blow_force.csv") if stage.made("measures", "blow_force.csv") else None,
         "published": {
             "closing_speed_m_per_s": read_json(stage.read("placement", "placement.json"))["closing_speed_m_per_s"],
+            **dict.fromkeys(NAMES),
             **{name: head[name] for name in head if name.startswith("peak_")},
             "crossover_time_s": measures["action"]["crossover_time_s"],
             "head_action_J_s": measures["action"]["head"],
@@ -370,9 +374,23 @@ def _mesh(model: Model) -> MeshView:
 
 def _snapshots(stage: Stage, model: Model) -> Snapshots:
     time, ids, values = read_snapshots(stage.read("replay", "brain_snapshots.h5"))
+    return Snapshots(time, _shown_rows(model, ids), values)
+
+
+def _damage_snapshots(stage: Stage, model: Model) -> Snapshots:
+    """The damage variable of the struck brain at the stored states (article, Figure 6)."""
+    brain = model.element_ids[model.elements_of(role="brain", player=1)]
+    with read_states(stage.read("replay", "states.vtkhdf")) as states:
+        at = np.flatnonzero(np.isin(states.element_ids, brain))
+        values = np.array([states.field("HV57", k)[at] for k in range(len(states))])
+        return Snapshots(states.times_s, _shown_rows(model, states.element_ids[at]), values, "damage variable φ")
+
+
+def _shown_rows(model: Model, ids: np.ndarray) -> np.ndarray:
+    """Rows of elements, by their numbers, in the `MeshView` of `_mesh`."""
     shown = model.element_ids[~model.elements_of(assembly="body")]
     row = {int(number): k for k, number in enumerate(shown)}
-    return Snapshots(time, np.array([row[int(i)] for i in ids]), values)
+    return np.array([row[int(i)] for i in ids])
 
 
 def _provenance(stage: Stage, model: Model) -> dict[str, Any]:
