@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from replay.errors import InputError
-from replay.play import members_of, read_ensemble
+from replay.play import Play, members_of, overridden, read_ensemble
 from replay.play.ensemble import EnsembleSettings
 from replay.stages.bands import bands_of, measures_in
 
@@ -108,6 +109,8 @@ def test_every_number_of_the_measures_has_a_name_of_its_own_and_a_unit() -> None
             "brain": {"frontal": {"mps_log_p95": 0.2, "tensile_pressure_p95_Pa": 1.4e4, "peak": None}},
             "damage": {"frontal": {"volume_phi_0.34_m3": 1e-9, "onset_phi_0.34_s": 0.01}},
             "action": {"head": 0.7, "helmet": 0.4, "impactor": None, "crossover_time_s": None},
+            "contact": {"pairs": [{"impulse_N_s": 9.0}], "blow": {"peak_force_N": 9e3, "impulse_N_s": 40.0}},
+            "facemask_mounts": "the struck player wears no facemask",
         }
     )
     assert found == {
@@ -116,6 +119,22 @@ def test_every_number_of_the_measures_has_a_name_of_its_own_and_a_unit() -> None
         "frontal tensile_pressure_p95_Pa": (1.4e4, "Pa"),
         "damage frontal volume_phi_0.34_m3": (1e-9, "m^3"),
         "damage frontal onset_phi_0.34_s": (0.01, "s"),
+        "blow peak_force_N": (9e3, "N"),
+        "blow impulse_N_s": (40.0, "N s"),
         "action head": (0.7, "J s"),
         "action helmet": (0.4, "J s"),
     }
+
+
+@pytest.mark.parametrize("name", ["helmets", "sweep"])
+def test_ensembles_of_the_collision_are_plays_that_can_be_run(name: str, repository: Path, tmp_path: Path) -> None:
+    folder = repository / "config/plays/collision-demo"
+    play = yaml.safe_load((folder / "play.yaml").read_text(encoding="utf-8"))
+    members = members_of("collision-demo", name, read_ensemble(folder / f"{name}.ensemble.yaml"))
+    asked = []
+    for member in members.values():
+        changed = overridden(play, member.overrides)
+        asked.append(Play.model_validate(changed, context={"folder": folder}).model_dump_json())
+        assert "replay" not in member.owners
+        assert member.owners.keys() >= {"inputs", "sensitivity"}
+    assert len(set(asked)) == len(members) >= 2, "no member is another"

@@ -11,11 +11,14 @@ from replay.report.markup import badge, document, label, number, section, table,
 
 _FIRST = (
     "peak_linear_acceleration",
+    "peak_angular_acceleration",
     "peak_angular_velocity",
     "HIC15",
     "BrIC",
     "brain mps_green_lagrange_p95",
     "action head",
+    "blow peak_force_N",
+    "facemask_mounts peak_force_N",
 )
 _STYLE = """svg.band { display: block; width: 9rem; height: .9rem; }
 svg.band .whole { stroke: #8a9099; stroke-width: 1; } svg.band .middle { fill: #56B4E9; }
@@ -51,17 +54,21 @@ def ensemble_page(name: str, title: str, members: Sequence[Mapping[str, Any]], b
     others = _bands("The other measures", [rows[m] for m in rest], "")
     body += f"<details><summary>The other {len(rest)} measures</summary>{others}</details>"
     paths = list(members[0]["varied"]) if members else []
+    own = ["the play", *("" for _ in paths), "", *(number(float(rows[m]["of_play"]), 4) for m in first)]
     who = table(
-        "One row a member",
+        "The play, and one row a member",
         ["member", *paths, "verdict", *(label(measure) for measure in first)],
         [
-            [
-                text(row["member"]),
-                *(text(row["varied"][path]) for path in paths),
-                _verdict(str(row["verdict"])),
-                *(number(row["measures"][m][0], 4) if m in row["measures"] else "" for m in first),
-            ]
-            for row in members
+            own,
+            *(
+                [
+                    text(row["member"]),
+                    *(text(row["varied"][path]) for path in paths),
+                    _verdict(str(row["verdict"])),
+                    *(number(row["measures"][m][0], 4) if m in row["measures"] else "" for m in first),
+                ]
+                for row in members
+            ),
         ],
         numeric=range(2 + len(paths), 2 + len(paths) + len(first)),
         stack=True,

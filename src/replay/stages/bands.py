@@ -46,7 +46,15 @@ MEMBERS = TableFormat(
 )
 _JUDGED = ("replay", "fidelity")
 _ORDER = ("pass", "vacuous", "warn", "fail")
-_UNITS = (("_m3", "m^3"), ("_Pa", "Pa"), ("_J_s", "J s"), ("_time_s", "s"), ("_s", "s"))
+_UNITS = (
+    ("_m3", "m^3"),
+    ("_force_N", "N"),
+    ("_N_s", "N s"),
+    ("_Pa", "Pa"),
+    ("_J_s", "J s"),
+    ("_time_s", "s"),
+    ("_s", "s"),
+)
 
 
 def run(workspace: Workspace, *, ensemble: Path | None = None) -> str | None:
@@ -121,6 +129,8 @@ def measures_in(document: dict[str, Any]) -> dict[str, tuple[float, str]]:
     found = {entry["name"]: (entry["value"], entry["unit"]) for entry in document["head"]}
     for group in ("brain", "damage"):
         found |= _numbers(group if group == "damage" else "", document.get(group))
+    found |= _numbers("blow", (document.get("contact") or {}).get("blow"))
+    found |= _numbers("facemask_mounts", document.get("facemask_mounts"))
     action = {name: document["action"].get(name) for name in ("head", "helmet", "impactor")}
     found |= {f"action {name}": (value, "J s") for name, value in action.items()}
     found["action crossover_time_s"] = (document["action"]["crossover_time_s"], "s")
