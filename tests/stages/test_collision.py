@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import signal
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import replay.solver.run as run_module
 from replay.errors import InputError
 from replay.measures import Motion, impulse_on, mount_impulse
 from replay.models import Model, assembly_mass, build_model, second_player
@@ -133,3 +135,28 @@ def test_players_who_do_not_close_are_refused(play: Play, models: dict[str, Mode
     starts["struck"] = dataclasses.replace(starts["struck"], velocity_m_per_s=starts["impactor"].velocity_m_per_s)
     with pytest.raises(InputError, match="the players do not close"):
         place(models, starts, play.collision)
+
+
+def test_threads_and_a_restart_change_no_byte_of_a_collision(
+    play: Play, scene: tuple[Model, dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, placement = scene
+    problem = collision_problem(model, placement, controls_of(play, 5e-4, checkpoint_every_s=0.0), play)
+    whole = solve(problem, tmp_path / "whole", threads=1, progress=None)
+    two = solve(problem, tmp_path / "two", threads=2, progress=None)
+
+    class HalfWay(run_module.Signals):
+        count = 0
+
+        def take(self) -> signal.Signals | None:
+            HalfWay.count += 1
+            return signal.SIGTERM if HalfWay.count == whole.steps // 2 else None
+
+    with monkeypatch.context() as patch, pytest.raises(SystemExit):
+        patch.setattr(run_module, "Signals", HalfWay)
+        solve(problem, tmp_path / "halves", threads=1, progress=None)
+    halves = solve(problem, tmp_path / "halves", threads=1, progress=None)
+    assert whole.energies["contact_normal_J"] > 1.0, "they did strike"
+    assert whole.state_hash == two.state_hash == halves.state_hash
+    for name in ("contact.csv", "histories.csv", "energy.csv"):
+        assert len({(tmp_path / run / name).read_bytes() for run in ("whole", "two", "halves")}) == 1
