@@ -1,7 +1,6 @@
 """Footage or a wearable to the six-degree-of-freedom motion of the skull CG; knows nothing of meshes."""
 
 from replay.motion.driver import Driver, DriverQuality, build_driver
-from replay.motion.filters import channel_frequency_class
 from replay.motion.kinematics import DRIVER, KINEMATICS, Kinematics
 from replay.motion.quality import ReconstructionQuality
 from replay.motion.reconstruct import Reconstruction, check_tracks, reconstruct
@@ -19,7 +18,6 @@ __all__ = [
     "ReconstructionQuality",
     "SyntheticPlay",
     "build_driver",
-    "channel_frequency_class",
     "check_tracks",
     "fit_start",
     "reconstruct",

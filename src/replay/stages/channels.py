@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from replay.measures import Motion, peak
-from replay.motion import channel_frequency_class
+from replay.motion.filters import channel_frequency_class, channel_frequency_class_cutoff
 
 CHANNEL_CLASSES = (1000, 180)
 """Channel frequency classes: 1000, that of SAE J211 for head acceleration, and a low one, to show what hangs on it."""
@@ -19,7 +19,8 @@ def peaks_behind_filters(motion: Motion) -> list[dict[str, Any]]:
     """Peaks of linear and angular acceleration, components filtered, as rows of ``measures.json``.
 
     A class is left out where there are fewer samples a second than the ten times its number that J211 asks for, or
-    where they are not uniform. A driven head needs no filter: its motion was filtered before.
+    where they are not uniform. A driven head needs no filter: its motion was filtered before. The last period of a
+    filter's corner is not looked at.
 
     Parameters
     ----------
@@ -38,7 +39,12 @@ def peaks_behind_filters(motion: Motion) -> list[dict[str, Any]]:
         for channel_class in CHANNEL_CLASSES:
             if rate * (1 + 1e-6) < _SAMPLES_PER_CLASS * channel_class:
                 continue
-            found = peak(motion.time_s, channel_frequency_class(vectors, channel_class, rate))
+            # a filter says nothing of the last period of its corner: there it ends where the record happens to end
+            inside = motion.time_s <= motion.time_s[-1] - 1.0 / channel_frequency_class_cutoff(channel_class)
+            behind = channel_frequency_class(vectors, channel_class, rate)
+            if not inside.any():
+                continue
+            found = peak(motion.time_s[inside], behind[inside])
             rows.append(
                 {
                     "name": f"peak_{quantity}_acceleration_cfc{channel_class}",
