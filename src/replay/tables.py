@@ -13,13 +13,15 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import pandas as pd
 
 from replay.errors import InputError, InputErrors
 from replay.files import read_text, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Kind = Literal["float", "int", "text"]
 _MOST_ERRORS = 20
@@ -155,6 +157,8 @@ class TableFormat:
                 kept[name].append(cells[name].strip())
         if errors:
             raise errors[0] if len(errors) == 1 else InputErrors(errors[:_MOST_ERRORS])
+        import pandas as pd  # a second to import, and half of the stages read no table
+
         frame = pd.DataFrame({**data, **kept})
         frame.attrs["lines"] = numbers
         return frame

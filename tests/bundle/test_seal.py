@@ -7,6 +7,7 @@ import hashlib
 import io
 import json
 import shutil
+import subprocess
 import tarfile
 import zipfile
 from pathlib import Path
@@ -67,6 +68,16 @@ def test_the_listing_does_not_depend_on_what_is_volatile(sealed):
     one, other = payload(sealed()), payload(sealed(log=b"took half an hour\n"))
     assert one["results/replay/run.log"] != other["results/replay/run.log"]
     assert one["artifacts.csv"] == other["artifacts.csv"]
+
+
+def test_the_hash_of_the_results_is_that_of_a_line_of_shell_and_times_do_not_enter_it(sealed, tmp_path):
+    one, other = verify(sealed()), verify(sealed(log=b"took half an hour\n"))
+    assert one.results_sha256 == other.results_sha256
+    (tmp_path / "artifacts.csv").write_bytes(payload(sealed())["artifacts.csv"])
+    command = "grep '^results/' artifacts.csv | sha256sum"
+    said = subprocess.run(command, shell=True, cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=True)
+    assert said.stdout.split()[0] == one.results_sha256
+    assert verify(sealed(rejected=True)).results_sha256 != one.results_sha256
 
 
 def test_checkpoints_logs_and_strays_are_left_out_by_name(tmp_path, source_root):

@@ -14,6 +14,7 @@ from replay.errors import BundleError
 ALGORITHMS = ("sha256", "sha512")
 DECLARATION = b"BagIt-Version: 1.0\nTag-File-Character-Encoding: UTF-8\n"
 PAYLOAD = "data/"
+RESULTS = "Replay-Results-SHA256"  # field of bag-info.txt
 _BLOCK = 1 << 20
 _LINE = re.compile(r"([0-9a-f]+)  (.+)")
 _ESCAPES = {"%": "%25", "\r": "%0D", "\n": "%0A"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,25 @@ ARTIFACTS = TableFormat(
         Column("meaning", "what it holds", "text", may_be_empty=True),
     ),
 )
+
+
+def results_hash(listing: bytes) -> str:
+    """Hash of what a run gave, without its times, its source and the machine: two equal runs share it.
+
+    Parameters
+    ----------
+    listing
+        ``artifacts.csv``.
+
+    Returns
+    -------
+    str
+        Hex SHA-256 of the lines that list files of ``results/``, as ``grep '^results/' artifacts.csv | sha256sum``
+        says it.
+    """
+    lines = (line for line in listing.split(b"\n") if line.startswith(b"results/"))
+    return hashlib.sha256(b"".join(line + b"\n" for line in lines)).hexdigest()
+
 
 # Folders and files that serve one running process alone.
 _NEVER = {"checkpoint": "serves an interrupted run alone", "states.partial": "serves an interrupted run alone"}

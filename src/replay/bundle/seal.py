@@ -15,7 +15,7 @@ from typing import Any
 from replay import __version__
 from replay.bundle import bag
 from replay.bundle.archive import Member, write_archive
-from replay.bundle.contents import ARTIFACTS, Item, LeftOut, Run, gather
+from replay.bundle.contents import ARTIFACTS, Item, LeftOut, Run, gather, results_hash
 from replay.bundle.crate import NAME as CRATE
 from replay.bundle.crate import About, crate_text
 from replay.bundle.package import facts_of, read_tracks
@@ -101,7 +101,8 @@ def seal(
         items += _papers(run, source, Path(results), with_play=bool(plays))
         _refuse_twice(items)
         digests = {item.path: _measure(item) for item in items}
-        listing = Item("artifacts.csv", _artifacts_csv(items, digests), meaning="every file with its class")
+        rows = _artifacts_csv(items, digests)
+        listing = Item("artifacts.csv", rows, meaning="every file with its class")
         items.append(listing)
         digests[listing.path] = _measure(listing)
         about = _about(run, source, jobs, metadata, {item.path for item in items})
@@ -111,7 +112,7 @@ def seal(
         digest_file = destination.with_name(destination.name + ".sha256")
         digest_file.unlink(missing_ok=True)
         with atomic_path(destination) as temporary:
-            write_archive(temporary, _members(run, items, digests, about))
+            write_archive(temporary, _members(run, items, digests, about, results_hash(rows)))
             digest = sha256(temporary)
         write_text(digest_file, f"{digest}  {destination.name}\n")
     return digest
@@ -212,7 +213,9 @@ def _about(run: Run, source: Source, jobs: Mapping[str, Job], metadata: Mapping[
     )
 
 
-def _members(run: Run, items: list[Item], digests: Mapping[str, bag.Digest], about: About) -> list[Member]:
+def _members(
+    run: Run, items: list[Item], digests: Mapping[str, bag.Digest], about: About, of_results: str
+) -> list[Member]:
     """Put the tag files of the bag around the payload; everything lies in one folder named after the play."""
     payload = {bag.PAYLOAD + path: digest for path, digest in digests.items()}
     info = {
@@ -222,6 +225,7 @@ def _members(run: Run, items: list[Item], digests: Mapping[str, bag.Digest], abo
         "External-Identifier": run.play,
         "External-Description": f"Replay of the play {run.play}: {run.verdict}",
         "Replay-Verdict": run.verdict,
+        bag.RESULTS: of_results,
         "Bag-Software-Agent": f"replay {about.replay_version}",
         "Payload-Oxum": bag.oxum(payload),
     }

@@ -19,7 +19,7 @@ from typing import Any
 from urllib.parse import unquote
 
 from replay.bundle import bag
-from replay.bundle.contents import ARTIFACTS
+from replay.bundle.contents import ARTIFACTS, results_hash
 from replay.bundle.crate import NAME as CRATE
 from replay.bundle.members import Members, open_members
 from replay.bundle.names import shown
@@ -45,6 +45,8 @@ class VerifyReport:
         ``NOT JUDGED``.
     files, bytes
         Number and size of the payload's files.
+    results_sha256
+        Of what the run gave (`replay.bundle.contents.results_hash`): two equal runs share it.
     sha256
         Of the archive; "" for a folder.
     digest_checked
@@ -59,6 +61,7 @@ class VerifyReport:
     line: str
     files: int
     bytes: int
+    results_sha256: str
     sha256: str
     digest_checked: bool
     minimum_package: dict[str, bool]
@@ -70,6 +73,7 @@ class VerifyReport:
             f"{self.path}: verified, {self.files} files, {self.bytes} bytes",
             f"play {self.play}: {self.verdict}",
         ]
+        lines.append(f"results {self.results_sha256} (equal runs share it)")
         if self.sha256:
             lines.append(f"sha256 {self.sha256} ({beside})")
         if missing := [item for item, whole in self.minimum_package.items() if not whole]:
@@ -95,6 +99,7 @@ def verify(path: str | Path) -> VerifyReport:
         tags = _read_tags(members)
         payload = _check_bytes(members, tags)
         facts = _check_description(members, payload)
+        of_results = _check_results_hash(members)
     digest, checked = ("", False) if path.is_dir() else _check_digest(path)
     package = facts.get("minimum_package", {})
     return VerifyReport(
@@ -104,6 +109,7 @@ def verify(path: str | Path) -> VerifyReport:
         line=shown(str(facts.get("line", ""))),
         files=len(payload),
         bytes=sum(d.size for d in payload.values()),
+        results_sha256=of_results,
         sha256=digest,
         digest_checked=checked,
         minimum_package={shown(name): bool(item["present"] and item["hashed"]) for name, item in package.items()},
@@ -273,6 +279,15 @@ def _check_listing(members: Members, payload: Mapping[str, bag.Digest]) -> None:
         known = ("", "") if row["class"] == "volatile" else (str(digest.size), digest.sha256)
         if (row["bytes"], row["sha256"]) != known or row["class"] not in ("exact", "tolerance", "volatile"):
             raise _refuse(members, bag.PAYLOAD + row["path"], f"is not as {_LISTING} lists it")
+
+
+def _check_results_hash(members: Members) -> str:
+    """Compare the hash of the results with what the listing, already checked, gives."""
+    digest = results_hash(_text(members, bag.PAYLOAD + _LISTING).encode())
+    said = bag.parse_info(_text(members, "bag-info.txt")).get(bag.RESULTS, digest)  # bundles of before have none
+    if said != digest:
+        raise _refuse(members, "bag-info.txt", f"says {said[:12]} of the results; {_LISTING} gives {digest[:12]}")
+    return digest
 
 
 def _check_digest(path: Path) -> tuple[str, bool]:

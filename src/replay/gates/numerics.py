@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from replay.gates.limits import Limits
 from replay.gates.model import Gate, Judge
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 NO_CONTACT = "no contact in this model"
 NO_ENERGY = "the run has no energy to keep account of"

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import StateSpace, lsim
 
 STANDARD_GRAVITY = 9.80665
 BRIC_CRITICAL_RAD_PER_S = (66.25, 56.45, 42.87)
@@ -162,6 +161,8 @@ def damage_deflection(time_s: ArrayLike, angular_acceleration_head_rad_per_s2: A
     alpha = np.asarray(angular_acceleration_head_rad_per_s2, dtype=float)
     time, _ = _checked(time_s, resultant(alpha))
     zero, one = np.zeros((3, 3)), np.eye(3)
+    from scipy.signal import StateSpace, lsim  # a second to import, and other rooms' numbers do not need it
+
     system = StateSpace(
         np.block([[zero, one], [-_DAMAGE_STIFFNESS, -_DAMAGE_DAMPING_S * _DAMAGE_STIFFNESS]]),
         np.vstack([zero, one]),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 _MINUS_3_DB = float(np.sqrt(0.5))
@@ -99,6 +98,8 @@ def channel_frequency_class_cutoff(channel_class: float) -> float:
 def _two_passes(values: np.ndarray, design_hz: float, rate_hz: float) -> np.ndarray:
     if design_hz >= 0.5 * rate_hz:
         return np.array(values, dtype=float)
+    from scipy.signal import butter, sosfiltfilt  # a second to import, and every stage imports this room
+
     sections = butter(2, design_hz, fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(np.ceil(3.0 * rate_hz / design_hz)))
     return sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=pad)

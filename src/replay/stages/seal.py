@@ -41,8 +41,8 @@ def run(workspace: Workspace, *, interrupted: bool = False) -> str | None:
         withhold=_withheld(workspace),
         unfinished=unfinished,
     )
-    verdict = verify(destination).verdict
-    print(f"{destination}: {verdict}, sealed and verified, sha256 {digest}")
+    sealed = verify(destination)
+    print(f"{destination}: {sealed.verdict}, sealed and verified, sha256 {digest}, results {sealed.results_sha256}")
     return None
 
 
