@@ -15,7 +15,7 @@ from replay.measures import Motion, read_snapshots
 from replay.models import Model, read_model
 from replay.play import Play
 from replay.report import MeshView, ReportInput, Snapshots, write_report
-from replay.solver import read_states
+from replay.solver.vtkhdf import read_states
 from replay.stages.channels import NAMES
 from replay.stages.fidelity import skull_motion
 from replay.stages.frame import Stage, Workspace, stages_of
