@@ -103,6 +103,8 @@ def damage_chart(damage: pd.DataFrame, against: str) -> Picture:
             title="Damage against action" if action else "Damage over time",
         )  # fmt: skip
         axes.set_ylim(0, max(1.05 * most, 1.0))
+        if most == 0.0:
+            axes.text(0.5, 0.5, "no element reaches φ = 0.001", transform=axes.transAxes, ha="center", va="center")
         legend_below(axes, 2)
         caption = "Share of each region's volume with φ ≥ 0.001, and thin with φ ≥ 0.34 (article, Figure 8)."
         name = "damage_against_action" if action else "damage_over_time"
