@@ -19,7 +19,7 @@ from footage import Clip, both_modes
 from scipy.spatial.transform import Rotation
 
 from replay.motion import bands, onset
-from replay.motion.bands import Band, Spread, constants, spread_of
+from replay.motion.bands import INSTANTS, Band, Spread, constants, spread_of
 from replay.motion.onset import contact_index
 from replay.motion.posterior import PosteriorMotion
 from replay.motion.protocol import ProtocolMotion, peak_frame
@@ -90,10 +90,12 @@ def kept_spread(name: str, row: Row) -> Spread:
 
 def kept_band(name: str, row: Row) -> Band:
     """Band of a quantity under the constants of today."""
-    if name != "t0_s":
-        return constants().apply(name, kept_spread(name, row), row["fps"])
-    curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
-    return constants().instants(start + step * np.arange(len(curve)), curve)
+    if name == "t0_s":
+        curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
+        found = constants().instants(start + step * np.arange(len(curve)), curve)
+    else:
+        found = constants().apply(name, kept_spread(name, row), row["fps"])
+    return found.of_event(row["event"]) if name in INSTANTS else found
 
 
 def _inner_truth(clip: Clip, posterior: PosteriorMotion) -> tuple[np.ndarray, float]:

@@ -13,7 +13,7 @@ over its own peak, is in the mean above a calibrated share of its greatest: one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,9 +29,12 @@ WIDEST_RATIO = 3.0
 """A peak whose upper bound is further than this from its lower one is not measured."""
 WIDEST_INSTANT_S = 0.040
 """An instant whose band is longer than this, all its parts together, is not measured [s]."""
+LEAST_EVENT = 0.5
+"""Probability of an impact below which it has no instant."""
+INSTANTS = ("t0_s", "onset_s")
 RATIOS = ("omega_rad_per_s", "alpha_rad_per_s2", "a_m_per_s2", "a_across_m_per_s2", "a_along_m_per_s2")
 """Peaks, whose errors are shares."""
-QUANTITIES = (*RATIOS, "t0_s", "onset_s")
+QUANTITIES = (*RATIOS, *INSTANTS)
 CURVES = ("omega", "alpha", "a")
 """Curves over time, whose bands are a multiple of the posterior's standard deviation."""
 BEFORE = ("velocity", "omega")
@@ -73,6 +76,10 @@ class Band:
     def ends(self) -> tuple[float, float]:
         """Lower and upper end."""
         return self.low, self.high
+
+    def of_event(self, probability: float) -> Band:
+        """The same band of an instant, not resolved where there hardly was an event."""
+        return replace(self, resolved=self.resolved and probability >= LEAST_EVENT)
 
     def covers(self, truth: float) -> bool:
         """Whether a value lies in the band."""

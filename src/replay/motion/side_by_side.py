@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.motion.bands import CURVES, NOT_RESOLVABLE, QUANTITIES, UNITS, Band, band, constants
+from replay.motion.bands import CURVES, INSTANTS, NOT_RESOLVABLE, QUANTITIES, UNITS, Band, band, constants
 from replay.motion.kinematics import KINEMATICS
 from replay.motion.posterior import PosteriorMotion
 from replay.motion.settings import CameraSettings
@@ -176,11 +176,10 @@ def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: Camera
     elif posterior.flip_margin < DECIDED_FLIP:
         undecided = "the clicks do not tell the path from its mirrored twin"
     outside += [undecided] * bool(undecided)
+    bands = {name: band(name, values, posterior.fps) for name, values in posterior.peaks.items() if name != "t0_s"}
+    bands |= {"t0_s": t0_band(posterior)}
     return PosteriorQuality(
-        bands={
-            name: t0_band(posterior) if name == "t0_s" else band(name, values, posterior.fps)
-            for name, values in posterior.peaks.items()
-        },
+        bands=bands | {name: bands[name].of_event(posterior.event_probability) for name in INSTANTS},
         band_class="calibrated" if not outside else "extrapolated: " + "; ".join(outside),
         flip_margin=posterior.flip_margin,
         flip_undecided=undecided,

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from replay.motion.bands import QUANTITIES, UNITS
+from replay.motion.bands import LEAST_EVENT, QUANTITIES, UNITS
 from replay.motion.initial_conditions import velocity_bands
 
 if TYPE_CHECKING:
@@ -36,16 +36,15 @@ def _before(result: Reconstruction) -> list[str]:
 def _in_short(result: Reconstruction) -> list[str]:
     """What the footage resolves, what it does not, and what would mend that."""
     assert result.posterior_quality is not None
-    bands, lines = (
-        result.posterior_quality.bands,
-        ["RESOLVED by this footage: value, and where the truth lies 19 times in 20"],
-    )
+    bands, seen = result.posterior_quality.bands, result.posterior_quality.event_probability
+    lines = [f"NO IMPACT is seen: its probability is {seen:.2g}; a slow turn fits the clicks"] * (seen < LEAST_EVENT)
+    lines.append("RESOLVED by this footage: value, and where the truth lies 19 times in 20")
     for name in QUANTITIES:
         label, unit, scale = UNITS[name]
         if bands[name].resolved:
             told = bands[name].text(scale, ".1f" if unit == "ms" else ".3g")
             lines.append(f"  {label:38s} {told} {unit}")
-    if len(lines) == 1:
+    if lines[-1].startswith("RESOLVED"):
         lines.append("  nothing")
     missing = [f"  {UNITS[name][0]}" for name in QUANTITIES if not bands[name].resolved]
     lines += ["NOT RESOLVED by this footage: no number is given", *missing] if missing else []
