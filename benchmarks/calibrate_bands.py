@@ -18,7 +18,7 @@ from footage import Clip, View, clip_of
 from measured import Row, collect, kept_spread, rows_of
 from scipy.optimize import minimize_scalar
 
-from replay.motion.bands import BEFORE, CONSTANTS_FILE, CURVES, RATIOS, level_set
+from replay.motion.bands import BEFORE, CONSTANTS_FILE, CURVES, RATIOS, Calibration, level_set
 from replay.motion.synthetic.families import BUILDING
 
 LEVEL = 0.95
@@ -59,11 +59,7 @@ def fit(paths: list[Path]) -> None:
         "families": list(BUILDING),
         "calibrated": {name: list(bounds) for name, bounds in RANGES.items()},
         "rates": rates,
-        "peaks": {
-            **{name: [_fit_peak(name, some) for some in by_rate] for name in RATIOS},
-            # its width is in seconds, so that frame rates share their clips
-            "onset_s": [_fit_peak("onset_s", rows) for _ in rates],
-        },
+        "peaks": {name: _fit_peak(name, rows, rates) for name in (*RATIOS, "onset_s")},
         "curves": {name: [_fit_curve(name, some) for some in by_rate] for name in CURVES},
         "before": {name: _fit_before(name, rows) for name in BEFORE},
         "instant": (level := _fit_instant(rows)),
@@ -81,25 +77,30 @@ def _reach(score: np.ndarray, level: float = LEVEL) -> float:
     return float(np.sort(score)[min(n - 1, int(np.ceil((n + 1) * level)) - 1)])
 
 
-def _fit_peak(name: str, rows: list[Row]) -> dict[str, list[float]]:
+def _fit_peak(name: str, rows: list[Row], rates: list[float]) -> dict[str, list[float]]:
     """Shift by the median error and widen to the conformal quantile, by thirds of the posterior's width.
 
-    The thirds tell how the error grows with the width (median and 90th percentile, which a few clips settle); all
-    clips together tell how far 97.5 % of the truths reach to either side in that measure, by the conformal rank.
+    How the error grows with the width is told by the clips of all rates together (median and 90th percentiles of its
+    thirds): given the width, the rate tells next to nothing. One factor a rate then makes the bands cover.
     """
-    rows = [row for row in rows if name in row["draws"]]
     found = [kept_spread(name, row) for row in rows]
-    centre, width = np.array([s.centre for s in found]), np.array([s.width for s in found])
-    true = np.array([row["truth"][name] for row in rows])
-    error = ((np.log(true) if name in RATIOS else true) - centre) / width
+    true, fps = np.array([row["truth"][name] for row in rows]), np.array([row["fps"] for row in rows])
+    width = np.array([s.width for s in found])
     thirds = np.array_split(np.argsort(width), 3)
-    out = {"widths": [np.median(width[third]) for third in thirds], "shift": [np.median(error[t]) for t in thirds]}
-    for side, sign in (("below", -1.0), ("above", 1.0)):
-        off = [sign * (error[third] - middle) for third, middle in zip(thirds, out["shift"])]
-        reach = np.array([np.quantile(some, 0.9) for some in off])
-        score = np.concatenate([some / far for some, far in zip(off, reach)])
-        out[side] = list(_reach(score, 0.5 + 0.5 * LEVEL) * reach)
-    return {key: [round(float(v), 6 if key == "widths" else 3) for v in values] for key, values in out.items()}
+    widths = [float(np.median(width[third])) for third in thirds]
+    width = np.maximum(width, widths[0])
+    error = ((np.log(true) if name in RATIOS else true) - [s.centre for s in found]) / width
+    shift = [float(np.median(error[third])) for third in thirds]
+    below, above = (
+        [float(np.quantile(sign * (error[third] - middle), 0.9)) for third, middle in zip(thirds, shift)]
+        for sign in (-1.0, 1.0)
+    )
+    known = Calibration(*map(tuple, (widths, shift, below, above)), factor=())
+    middle, down, up = np.array([known.at(w) for w in width]).T
+    score = np.maximum((middle - error) / down, (error - middle) / up)
+    factor = [_reach(score[fps == rate]) for rate in rates]
+    out = {"widths": widths, "shift": shift, "below": below, "above": above, "factor": factor}
+    return {key: [round(v, 6 if key == "widths" else 3) for v in values] for key, values in out.items()}
 
 
 def _fit_curve(name: str, rows: list[Row]) -> float:

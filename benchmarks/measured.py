@@ -1,32 +1,49 @@
 """What is kept of a clip: everything that bands, their calibration and the table are computed from, one JSON line.
 
-Filming is slow and its rows are kept; rules for bands may then change and be judged again at once.
+Filming is slow and its rows are kept; rules for bands may then change and be judged again at once. A row knows the
+sources that it was made by, and is left out where they have changed since: a table is of one estimator.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import footage
 import numpy as np
 from footage import Clip, both_modes
 from scipy.spatial.transform import Rotation
 
-from replay.motion.bands import Band, Spread, constants, spread_of
+from replay.motion import bands, onset
+from replay.motion.bands import INSTANTS, Band, Spread, constants, spread_of
 from replay.motion.onset import contact_index
 from replay.motion.posterior import PosteriorMotion
 from replay.motion.protocol import ProtocolMotion, peak_frame
+from replay.sources import sources_of
 
 Row = dict[str, Any]
 SHARES = (0.05, 0.16, 0.25, 0.5, 0.75, 0.84, 0.95)
 """Quantiles of the draws that are kept of every peak."""
 
 
+@cache
+def estimator() -> str:
+    """Hash of the sources that film and reconstruct a clip; the bands are put on afterwards."""
+    motion = Path(onset.__file__).parent
+    makers = (motion / "posterior.py", motion / "synthetic" / "footage.py", motion / "synthetic" / "families.py")
+    sources = {path for maker in makers for path in sources_of(maker)} - {Path(bands.__file__), bands.CONSTANTS_FILE}
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in (*sorted(sources), Path(footage.__file__))))
+    return digest.hexdigest()[:12]
+
+
 def rows_of(path: Path) -> list[Row]:
-    """Every clip that a file holds."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    """Every clip that a file holds of today's estimator."""
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    return [row for row in rows if row["estimator"] == estimator()]
 
 
 def collect(path: Path, seeds: range, clip_of: Callable[[int], tuple[str, Clip]]) -> None:
@@ -36,7 +53,7 @@ def collect(path: Path, seeds: range, clip_of: Callable[[int], tuple[str, Clip]]
     for seed in seeds:
         if seed not in done:
             family, clip = clip_of(seed)
-            row = {"family": family, "seed": seed, **measure(clip, *both_modes(clip))}
+            row = {"estimator": estimator(), "family": family, "seed": seed, **measure(clip, *both_modes(clip))}
             with path.open("a") as out:
                 out.write(json.dumps(row) + "\n")
 
@@ -73,10 +90,12 @@ def kept_spread(name: str, row: Row) -> Spread:
 
 def kept_band(name: str, row: Row) -> Band:
     """Band of a quantity under the constants of today."""
-    if name != "t0_s":
-        return constants().apply(name, kept_spread(name, row), row["fps"])
-    curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
-    return constants().instants(start + step * np.arange(len(curve)), curve)
+    if name == "t0_s":
+        curve, (start, step) = np.array(row["t0"]["relative_alpha"]), row["t0"]["time_s"]
+        found = constants().instants(start + step * np.arange(len(curve)), curve)
+    else:
+        found = constants().apply(name, kept_spread(name, row), row["fps"])
+    return found.of_event(row["event"]) if name in INSTANTS else found
 
 
 def _inner_truth(clip: Clip, posterior: PosteriorMotion) -> tuple[np.ndarray, float]:

@@ -51,6 +51,21 @@ def test_a_row_of_the_table_has_as_many_cells_as_its_heading(suite, row):
     cells = suite.line(suite.CELLS["base"], [row] * 5).count("|")
     assert cells == suite.HEADER.splitlines()[0].count("|") == suite.HEADER.splitlines()[1].count("|")
     assert suite.line(suite.CELLS["null"], [row] * 5).count("|") == cells
+    assert {line.count("|") for line in suite.by_family([row, row]).splitlines()} == {8}
+
+
+def test_rows_of_another_estimator_are_filmed_again(measured, row, tmp_path):
+    file = tmp_path / "cell.jsonl"
+    kept = [{**row, "estimator": made_by} for made_by in (measured.estimator(), "0" * 12)]
+    file.write_text("".join(json.dumps(one) + "\n" for one in kept))
+    assert [one["estimator"] for one in measured.rows_of(file)] == [measured.estimator()]
+
+
+def test_a_mirror_image_that_the_margin_calls_sure_is_counted(suite, row):
+    mirrored = {**row, "flipped": True, "flip_margin": suite.DECIDED_FLIP + 1.0}
+    told = suite.flips({"three": [row, mirrored], "base": [row] * 3})
+    assert "three landmarks, 2 clips: protocol mode holds the mirror image in 0, posterior mode in 1" in told
+    assert "above it in 1 of those that are flipped. With four or more, 3 clips" in told
 
 
 def test_cells_differ_and_change_one_thing_at_a_time(suite):

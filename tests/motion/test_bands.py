@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from replay.motion.bands import CONSTANTS_FILE, QUANTITIES, band, constants
+from replay.motion.bands import CONSTANTS_FILE, QUANTITIES, Spread, band, constants
 from replay.motion.readout import ANGULAR, read_out
 from replay.motion.synthetic.families import BUILDING, TESTING, draw
 
@@ -66,11 +66,20 @@ def test_every_quantity_has_constants():
     assert {*known.peaks, "t0_s"} == set(QUANTITIES)
     assert list(known.rates) == sorted(known.rates)
     assert 0.0 < known.instant < 1.0
-    for by_rate in known.peaks.values():
-        assert len(by_rate) == len(known.rates)
-        for calibration in by_rate:
-            assert sorted(calibration.widths) == list(calibration.widths)
-            assert min(*calibration.below, *calibration.above) > 0.0
+    for calibration in known.peaks.values():
+        assert sorted(calibration.widths) == list(calibration.widths)
+        assert min(*calibration.below, *calibration.above, *calibration.factor) > 0.0
+        assert len(calibration.factor) == len(known.rates)
+
+
+def test_no_posterior_counts_as_surer_than_the_sharpest_of_the_calibration():
+    known = constants()
+    sharpest = known.peaks["omega_rad_per_s"].widths[0]
+    sharp, sharper, vague = (
+        known.apply("omega_rad_per_s", Spread(3.0, share * sharpest), 59.94).ends for share in (1.0, 0.1, 2.0)
+    )
+    assert sharp == sharper
+    assert vague[1] / vague[0] > 1.1 * sharp[1] / sharp[0]
 
 
 def test_constants_between_two_rates_lie_between_theirs():

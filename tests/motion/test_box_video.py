@@ -80,6 +80,9 @@ def test_a_real_video_is_digitised_and_its_poses_are_those_of_a_box_in_a_hand(fo
     assert np.linalg.norm(np.diff(k.position_m, axis=0), axis=1).max() < 0.04
     assert k.omega_resultant.max() < 2.0
     assert quality["reprojection_rmse_px"].median() < 4.0
+    # a hand strikes nothing: neither t0 nor an onset is made up
+    assert not any(result.posterior_quality.bands[name].resolved for name in ("t0_s", "onset_s"))
+    assert "NO IMPACT is seen" in (folder / "out" / "qc_summary.txt").read_text()
     gate = video_reconstruction_gate(result.quality.gate_values(), Limits.load())
     verdicts = {check.name: check.verdict for check in gate.checks}
     assert verdicts["reprojection_rmse_median_px"] == "pass"

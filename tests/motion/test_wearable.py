@@ -114,6 +114,7 @@ def test_clipping_and_the_range_that_was_used_are_reported(wearable):
         ("\n5,", "\n5.5,", ["wearable.csv:7: time_ms", "uneven"]),
         ("\n5,", "\n4,", ["wearable.csv:7: time_ms", "stands still or runs back"]),
         ("\n5,", "\n5,x", ["wearable.csv:7: ax_g", "is not a number"]),
+        ("\n0,-0.5048", "\n0,-1e308", ["wearable.csv:2: ax_g", "reaches inf m/s^2, which no head survives"]),
     ],
 )
 def test_bad_tables_are_named_by_line(wearable, old, new, expected):

@@ -2,9 +2,9 @@
 
 from replay.motion.driver import Driver, DriverQuality, build_driver
 from replay.motion.kinematics import DRIVER, KINEMATICS, Kinematics
+from replay.motion.onset import steady_before
 from replay.motion.quality import ReconstructionQuality
 from replay.motion.reconstruct import Reconstruction, check_tracks, reconstruct
-from replay.motion.start import fit_start
 from replay.motion.synthetic import Impact, SyntheticPlay, synthesise
 
 __all__ = [
@@ -19,7 +19,7 @@ __all__ = [
     "SyntheticPlay",
     "build_driver",
     "check_tracks",
-    "fit_start",
     "reconstruct",
+    "steady_before",
     "synthesise",
 ]

@@ -2,8 +2,9 @@
 
 The posterior knows the noise of the clicks but not how real motions differ from its shapes. So its centre is shifted
 and its spread multiplied by constants under which, on motions with a known truth, 95 % of the truths lay inside
-(split conformal, by the width of the posterior and the frame rate). The constants lie in ``data/bands.yaml``, made by
-``benchmarks/calibrate_bands.py``. A band too wide to be a measurement is replaced by the words for it.
+(split conformal, by the width of the posterior, with a factor for the frame rate). The constants lie in
+``data/bands.yaml``, made by ``benchmarks/calibrate_bands.py``. A band too wide to be a measurement is replaced by the
+words for it.
 
 The instant of peak angular acceleration is no centre with a width: impacts have several lobes of like height, and which
 is greatest is often not in the footage. Its band is the set of instants at which the drawn motions' acceleration, each
@@ -12,7 +13,7 @@ over its own peak, is in the mean above a calibrated share of its greatest: one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,12 @@ WIDEST_RATIO = 3.0
 """A peak whose upper bound is further than this from its lower one is not measured."""
 WIDEST_INSTANT_S = 0.040
 """An instant whose band is longer than this, all its parts together, is not measured [s]."""
+LEAST_EVENT = 0.5
+"""Probability of an impact below which it has no instant."""
+INSTANTS = ("t0_s", "onset_s")
 RATIOS = ("omega_rad_per_s", "alpha_rad_per_s2", "a_m_per_s2", "a_across_m_per_s2", "a_along_m_per_s2")
 """Peaks, whose errors are shares."""
-QUANTITIES = (*RATIOS, "t0_s", "onset_s")
+QUANTITIES = (*RATIOS, *INSTANTS)
 CURVES = ("omega", "alpha", "a")
 """Curves over time, whose bands are a multiple of the posterior's standard deviation."""
 BEFORE = ("velocity", "omega")
@@ -73,6 +77,10 @@ class Band:
         """Lower and upper end."""
         return self.low, self.high
 
+    def of_event(self, probability: float) -> Band:
+        """The same band of an instant, not resolved where there hardly was an event."""
+        return replace(self, resolved=self.resolved and probability >= LEAST_EVENT)
+
     def covers(self, truth: float) -> bool:
         """Whether a value lies in the band."""
         pieces = [(part.low, part.high) for part in self.parts] or [(self.low, self.high)]
@@ -110,22 +118,26 @@ def spread_of(name: str, *quantiles: float) -> Spread:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Constants of one quantity at one frame rate, interpolated over the logarithm of the posterior's width.
+    """Constants of one quantity, interpolated over the logarithm of the posterior's width.
 
     Parameters
     ----------
     widths
-        Knots.
+        Knots. A posterior surer than the first, that of the calibration's sharpest third, counts as that one: it does
+        not know how far its shapes are from the truth.
     shift
         Added to the centre, in widths.
     below, above
         Distance of either bound from the shifted centre, in widths: frames oftener miss a peak than invent one.
+    factor
+        Of both distances, by frame rate.
     """
 
     widths: tuple[float, ...]
     shift: tuple[float, ...]
     below: tuple[float, ...]
     above: tuple[float, ...]
+    factor: tuple[float, ...]
 
     def at(self, width: float) -> np.ndarray:
         """Shift, and distances below and above."""
@@ -135,7 +147,7 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Constants:
-    """Everything in ``data/bands.yaml``; of peaks and curves one entry a frame rate, interpolated over its logarithm.
+    """Everything in ``data/bands.yaml``; what goes by frame rate is interpolated over its logarithm.
 
     Parameters
     ----------
@@ -153,7 +165,7 @@ class Constants:
     """
 
     rates: tuple[float, ...]
-    peaks: dict[str, tuple[Calibration, ...]]
+    peaks: dict[str, Calibration]
     curves: dict[str, tuple[float, ...]]
     before: dict[str, float]
     instant: float
@@ -165,7 +177,7 @@ class Constants:
         """From the file's content."""
         return cls(
             tuple(raw["rates"]),
-            {n: tuple(Calibration(**{k: tuple(v) for k, v in c.items()}) for c in r) for n, r in raw["peaks"].items()},
+            {n: Calibration(**{k: tuple(v) for k, v in known.items()}) for n, known in raw["peaks"].items()},
             {n: tuple(v) for n, v in raw["curves"].items()},
             {n: float(v) for n, v in raw["before"].items()},
             float(raw["instant"]),
@@ -179,8 +191,9 @@ class Constants:
 
     def apply(self, name: str, found: Spread, fps: float) -> Band:
         """Shift and widen."""
-        columns = zip(*(calibration.at(found.width) for calibration in self.peaks[name]))
-        shift, below, above = (self.at_rate(values, fps) * found.width for values in columns)
+        known = self.peaks[name]
+        width, factor = max(found.width, known.widths[0]), self.at_rate(known.factor, fps)
+        shift, below, above = known.at(width) * [width, factor * width, factor * width]
         centre = found.centre + shift
         if name in RATIOS:
             low, value, high = (float(np.exp(x)) for x in (centre - below, centre, centre + above))
@@ -231,11 +244,11 @@ def band(name: str, values: np.ndarray, fps: float) -> Band:
 
 
 UNITS = {
-    "omega_rad_per_s": ("angular velocity", "rad/s", 1.0),
-    "alpha_rad_per_s2": ("angular acceleration", "rad/s^2", 1.0),
-    "a_m_per_s2": ("CG acceleration, resultant", "g", STANDARD_GRAVITY),
-    "a_across_m_per_s2": ("  across the line of sight", "g", STANDARD_GRAVITY),
-    "a_along_m_per_s2": ("  along the line of sight", "g", STANDARD_GRAVITY),
+    "omega_rad_per_s": ("peak angular velocity", "rad/s", 1.0),
+    "alpha_rad_per_s2": ("peak angular acceleration", "rad/s^2", 1.0),
+    "a_m_per_s2": ("peak acceleration of the CG", "g", STANDARD_GRAVITY),
+    "a_across_m_per_s2": ("  its part across the line of sight", "g", STANDARD_GRAVITY),
+    "a_along_m_per_s2": ("  its part along the line of sight", "g", STANDARD_GRAVITY),
     "t0_s": ("instant of peak angular acceleration", "ms", 1.0e-3),
     "onset_s": ("onset of the impact", "ms", 1.0e-3),
 }

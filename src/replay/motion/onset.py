@@ -1,8 +1,9 @@
 """When the impact sets in, and how the head moved until then: what a collision starts from.
 
 The onset is where the angular or the CG acceleration, whichever is first, rises from a tenth of its peak to a lobe of
-at least half of it: forerunners do not count. The motion at that instant is fitted to the frames before it alone: no
-pulse, whatever its shape, has a say in it.
+at least half of it: forerunners do not count. The motion at that instant is fitted to what lies before it alone: no
+pulse, whatever its shape, has a say in it. Two ways lead there. `before_onset` takes the clicks' own information, and
+knows how sure it is; `steady_before` takes any record, a wearable's too, up to an instant that the play states.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from replay.errors import InputError
 from replay.motion.kinematics import Kinematics
 from replay.motion.readout import ANGULAR, LINEAR, read_quiet
 from replay.motion.settings import CameraSettings
@@ -20,6 +22,8 @@ from replay.motion.told import Told, Turning
 MAJOR, BEGUN = 0.5, 0.1
 """Shares of its peak: of the first lobe that counts as the impact, and where it has begun."""
 _SURELY_BEFORE = 0.05
+_WHERE = "play.yaml"
+_LEAST_SAMPLES, _ROUNDS = 3, 3
 
 
 @dataclass(frozen=True)
@@ -93,3 +97,53 @@ def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera:
         sigma_velocity_m_per_s=np.sqrt(np.diag(ray @ path.covariance @ ray.T)),
         sigma_omega_rad_per_s=np.sqrt(np.diag(body @ spin.covariance @ body.T)),
     )
+
+
+def steady_before(kinematics: Kinematics, end_s: float, fit_s: float) -> Kinematics:
+    """Fit a straight path and a steady turn to the record that ends at a time.
+
+    Least squares over positions, and over rotation vectors from a reference that follows the fit: no rate of the
+    reconstruction is used, which near an impact its filters would smear into the time before.
+
+    Parameters
+    ----------
+    kinematics
+        Of the skull CG.
+    end_s
+        End of the fitted record, and the time of the answer [s].
+    fit_s
+        Its length [s].
+
+    Returns
+    -------
+    Kinematics
+        One sample, at `end_s`; accelerations are zero.
+
+    Raises
+    ------
+    InputError
+        When the record has fewer than three samples there.
+    """
+    time = kinematics.time_s
+    chosen = (time >= end_s - fit_s - 1e-9) & (time <= end_s + 1e-9)
+    if chosen.sum() < _LEAST_SAMPLES:
+        raise InputError(
+            _WHERE,
+            f"{int(chosen.sum())} samples lie in the {1e3 * fit_s:g} ms before the window",
+            column="collision",
+            expected=f"at least {_LEAST_SAMPLES}: two of them leave nothing to judge the fit by",
+            mend="make `fit_s` longer, or add frames before the impact",
+        )
+    since = time[chosen] - end_s
+    design = np.stack([np.ones_like(since), since], axis=1)
+    (position, velocity), *_ = np.linalg.lstsq(design, kinematics.position_m[chosen], rcond=None)
+    seen = kinematics.rotation[chosen]
+    at_end, omega = seen[len(since) - 1], np.zeros(3)
+    for _ in range(_ROUNDS):
+        steady = Rotation.from_rotvec(since[:, None] * omega) * at_end
+        off = (seen * steady.inv()).as_rotvec()
+        (turn, rate), *_ = np.linalg.lstsq(design, off, rcond=None)
+        at_end, omega = Rotation.from_rotvec(turn) * at_end, omega + rate
+    still = np.zeros((1, 3))
+    turned = Rotation.from_quat(at_end.as_quat()[None])
+    return Kinematics(np.array([end_s]), position[None], turned, velocity[None], still, omega[None], still)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from replay.motion.bands import CURVES, NOT_RESOLVABLE, QUANTITIES, UNITS, Band, band, constants
+from replay.motion.bands import CURVES, INSTANTS, NOT_RESOLVABLE, QUANTITIES, UNITS, Band, band, constants
 from replay.motion.kinematics import KINEMATICS
 from replay.motion.posterior import PosteriorMotion
 from replay.motion.settings import CameraSettings
@@ -18,6 +18,7 @@ COMPETE = "{} instants compete"
 """Where the band of an instant is in several parts."""
 DECIDED_FLIP = 3.0
 """Log odds from which the path is told from its mirrored twin: twenty to one."""
+SMOOTHNESS_ALONE = "three landmarks fit the path and its mirror image exactly: only smoothness tells them apart"
 _CURVE_UNITS = {"omega": "rad_per_s", "alpha": "rad_per_s2", "a": "m_per_s2"}
 _CURVE_WORDS = {"omega": "angular velocity", "alpha": "angular acceleration", "a": "CG acceleration"}
 
@@ -89,6 +90,8 @@ class PosteriorQuality:
         ``calibrated`` where the bands were made to cover on footage like this, else why not.
     flip_margin
         Log odds of the path against its mirrored twin; infinite where there is none.
+    flip_undecided
+        Why the twin is not excluded; empty where it is.
     event_probability, null_peak_rad_per_s, click_sigma_px
         Of `replay.motion.posterior.PosteriorMotion`; click noise as estimated.
     """
@@ -96,6 +99,7 @@ class PosteriorQuality:
     bands: dict[str, Band]
     band_class: str
     flip_margin: float
+    flip_undecided: str
     event_probability: float
     null_peak_rad_per_s: float
     click_sigma_px: float
@@ -121,6 +125,7 @@ class PosteriorQuality:
             },
             "band_class": self.band_class,
             "flip_margin": self.flip_margin if np.isfinite(self.flip_margin) else "no second path",
+            "flip_undecided": self.flip_undecided,
             "event_probability": self.event_probability,
             "null_peak_rad_per_s": self.null_peak_rad_per_s,
             "click_sigma_px": self.click_sigma_px,
@@ -131,7 +136,11 @@ class PosteriorQuality:
         omega, t0 = self.bands["omega_rad_per_s"], self.bands["t0_s"]
         return {
             "posterior_flip_margin": (
-                self.flip_margin if np.isfinite(self.flip_margin) else "no mirrored twin of the path fits the clicks"
+                SMOOTHNESS_ALONE
+                if self.flip_undecided == SMOOTHNESS_ALONE
+                else self.flip_margin
+                if np.isfinite(self.flip_margin)
+                else "no mirrored twin of the path fits the clicks"
             ),
             "posterior_peak_over_null": self.peak_over_null,
             "bands_calibrated": self.band_class == "calibrated",
@@ -161,15 +170,19 @@ def posterior_quality(posterior: PosteriorMotion, tracks: Tracks, camera: Camera
         for low, high in [constants().calibrated[name]]
         if not 0.95 * low <= value <= 1.05 * high
     ]
-    if posterior.flip_margin < DECIDED_FLIP:
-        outside.append("the clicks do not tell the path from its mirrored twin")
+    undecided = ""
+    if facts["landmarks"] <= 3:
+        undecided = SMOOTHNESS_ALONE
+    elif posterior.flip_margin < DECIDED_FLIP:
+        undecided = "the clicks do not tell the path from its mirrored twin"
+    outside += [undecided] * bool(undecided)
+    bands = {name: band(name, values, posterior.fps) for name, values in posterior.peaks.items() if name != "t0_s"}
+    bands |= {"t0_s": t0_band(posterior)}
     return PosteriorQuality(
-        bands={
-            name: t0_band(posterior) if name == "t0_s" else band(name, values, posterior.fps)
-            for name, values in posterior.peaks.items()
-        },
+        bands=bands | {name: bands[name].of_event(posterior.event_probability) for name in INSTANTS},
         band_class="calibrated" if not outside else "extrapolated: " + "; ".join(outside),
         flip_margin=posterior.flip_margin,
+        flip_undecided=undecided,
         event_probability=posterior.event_probability,
         null_peak_rad_per_s=posterior.null_peak_rad_per_s,
         click_sigma_px=batch.sigma_px,
@@ -247,28 +260,26 @@ def click_weights(posterior: PosteriorMotion, tracks: Tracks, template: Template
 
 
 def advice(quality: PosteriorQuality, tracks: Tracks, camera: CameraSettings, scale_px_per_m: float) -> list[str]:
-    """Lines for a reader: what this footage resolves, what it does not, and what would mend it."""
-    resolved = [UNITS[name][0].strip() for name in QUANTITIES if quality.bands[name].resolved]
-    missing = [UNITS[name][0].strip() for name in QUANTITIES if not quality.bands[name].resolved]
-    lines = ["Resolved:     " + (", ".join(resolved) or "nothing"), "Not resolved: " + (", ".join(missing) or "-")]
-    mend = []
+    """What would make more of the motion resolvable, the strongest first; each line begins with what to change."""
+    bands, mend = quality.bands, []
     landmarks = int(np.median(tracks.seen.sum(axis=1)))
-    accelerations = any(not quality.bands[name].resolved for name in ("alpha_rad_per_s2", "a_across_m_per_s2"))
-    t0 = quality.bands["t0_s"]
-    if t0.parts and t0.resolved:
-        mend.append(f"t0: {COMPETE.format(len(t0.parts))}, lobes of like height: replay each, or film faster")
-    if camera.fps < 115.0 and accelerations:
-        mend.append(f"frame rate: at {camera.fps:g} fps a pulse of 10 ms falls between frames; 240 fps would show it")
+    missing = any(not band.resolved for band in bands.values())
+    t0 = bands["t0_s"]
+    if quality.flip_undecided:
+        mend.append("mirror image: the picture fits two poses; click a fourth landmark out of the plane of the others")
     if landmarks < 6:
-        mend.append(f"landmarks: {landmarks} a frame are clicked; 6 that do not lie in one plane would settle the pose")
-    if scale_px_per_m < 300.0 and missing:
-        mend.append(f"closeness: {scale_px_per_m:.0f} px/m; twice the zoom halves every angular band")
-    if quality.click_sigma_px > 1.5 and missing:
+        mend.append(f"landmarks: {landmarks} a frame are clicked; 6 that do not lie in one plane settle the pose")
+    if camera.fps < 115.0:
         mend.append(
-            f"clicks: {quality.click_sigma_px:.2g} px of noise; a second click of each landmark, or tracking, helps"
+            f"frame rate: {1e3 / camera.fps:.0f} ms between frames is as long as an impact; 240 fps narrows the band "
+            "of peak angular velocity to a third"
         )
-    if quality.flip_margin < DECIDED_FLIP:
-        mend.append("the pose and its mirror image fit alike: click a landmark out of the plane of the others")
-    if not quality.bands["a_along_m_per_s2"].resolved:
-        mend.append("along the line of sight: a second camera; depth comes from the size of the helmet in the picture")
-    return lines + ["What would help:"] * bool(mend) + [f"  - {line}" for line in mend]
+    if scale_px_per_m < 300.0:
+        mend.append(f"closeness: {scale_px_per_m:.0f} px/m; zooming in to 300 px/m or more narrows every band")
+    if quality.click_sigma_px > 1.5:
+        mend.append(f"clicks: {quality.click_sigma_px:.2g} px of noise; click twice, or use `replay digitize`")
+    if t0.resolved and t0.parts:
+        mend.append(f"t0: {COMPETE.format(len(t0.parts))}, lobes of like height; replay each of them")
+    if any(not bands[name].resolved for name in ("alpha_rad_per_s2", "a_across_m_per_s2", "a_along_m_per_s2")):
+        mend.append("accelerations: no video up to 240 fps resolved them in our tests; an instrumented mouthguard does")
+    return mend if missing or t0.parts or quality.flip_undecided else []

@@ -104,9 +104,11 @@ def read_wearable(path: Path, source: WearableSource) -> tuple[np.ndarray, dict[
         raise InputError(_PLAY, found, column="source.columns", mend="name each column once")
     frame = TableFormat("wearable table", tuple(Column(name, "") for name in names)).read(path)
     lines = frame.attrs["lines"]
-    time = frame[columns.time.name].to_numpy() * _FACTORS[columns.time.unit]
-    _refuse_uneven(path, columns.time.name, time, lines)
-    channels = {key: frame[list(group.names)].to_numpy() * _FACTORS[group.unit] for key, group in groups.items()}
+    # a number too large for its unit becomes infinite, and is refused as such
+    with np.errstate(over="ignore"):
+        time = frame[columns.time.name].to_numpy() * _FACTORS[columns.time.unit]
+        _refuse_uneven(path, columns.time.name, time, lines)
+        channels = {key: frame[list(group.names)].to_numpy() * _FACTORS[group.unit] for key, group in groups.items()}
     for key, limit, unit in (
         ("acceleration", _ACCELERATION_LIMIT, "m/s^2"),
         ("angular_velocity", _SPIN_LIMIT, "rad/s"),

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from replay.models import Model
-from replay.motion import Kinematics, fit_start
+from replay.motion import Kinematics, steady_before
 from replay.play import Collision, GivenStart
 from replay.solver import initial_velocity_about_axis
 
@@ -96,7 +96,8 @@ def start_of(collision: Collision, role: str, kinematics: Kinematics, window_sta
             np.array(start.p_m, float),
             np.array(start.q_m, float),
         )
-    rotation, velocity, omega = fit_start(kinematics, window_start_s, start.fit_s)
+    before = steady_before(kinematics, window_start_s, start.fit_s)
+    rotation, velocity, omega = before.rotation[0], before.velocity_m_per_s[0], before.omega_rad_per_s[0]
     speed = float(np.sqrt(omega @ omega))
     axis = rotation.inv().apply(omega / speed) if speed > 0 else np.array([0.0, 0.0, 1.0])
     return PlayerStart(rotation, velocity, speed, np.zeros(3), axis)

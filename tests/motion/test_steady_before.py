@@ -1,4 +1,4 @@
-"""How a player starts: a straight path and a steady turn are found exactly, and noise is averaged out."""
+"""A head before its impact, from any record: straight and steady is found exactly, noise averages out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from replay.errors import InputError
-from replay.motion import Kinematics, fit_start
+from replay.motion import Kinematics, steady_before
 
 VELOCITY, OMEGA = np.array([8.3, 0.2, -1.0]), np.array([2.0, -45.0, 6.0])
 TILT = Rotation.from_euler("xyz", [0.3, -0.8, 1.9])
@@ -26,24 +26,24 @@ def record(rate_hz: float, noise_m: float = 0.0, noise_rad: float = 0.0, after: 
 
 
 def test_a_steady_flight_is_found_exactly() -> None:
-    rotation, velocity, omega = fit_start(record(240.0), 0.0, 0.030)
-    np.testing.assert_allclose(velocity, VELOCITY, rtol=1e-10)
-    np.testing.assert_allclose(omega, OMEGA, rtol=1e-8)
-    assert (rotation * TILT.inv()).magnitude() < 1e-9
+    before = steady_before(record(240.0), 0.0, 0.030)
+    np.testing.assert_allclose(before.velocity_m_per_s, VELOCITY[None], rtol=1e-10)
+    np.testing.assert_allclose(before.omega_rad_per_s, OMEGA[None], rtol=1e-8)
+    np.testing.assert_allclose(before.position_m, 0.0, atol=1e-10)
+    assert (before.rotation[0] * TILT.inv()).magnitude() < 1e-9
 
 
 def test_the_blow_itself_does_not_leak_into_the_start() -> None:
-    _, long, _ = fit_start(record(240.0, after=0.2), 0.0, 0.030)
-    _, short, _ = fit_start(record(240.0, after=0.001), 0.0, 0.030)
-    np.testing.assert_array_equal(long, short)
+    long, short = (steady_before(record(240.0, after=span), 0.0, 0.030) for span in (0.2, 0.001))
+    np.testing.assert_array_equal(long.velocity_m_per_s, short.velocity_m_per_s)
 
 
 def test_more_frames_average_noise_out() -> None:
     noisy = record(480.0, noise_m=0.002, noise_rad=0.01)
-    error = [np.linalg.norm(fit_start(noisy, 0.0, span)[1] - VELOCITY) for span in (0.008, 0.090)]
+    error = [np.linalg.norm(steady_before(noisy, 0.0, span).velocity_m_per_s - VELOCITY) for span in (0.008, 0.090)]
     assert error[1] < 0.2 * error[0]
 
 
 def test_too_few_frames_are_refused() -> None:
     with pytest.raises(InputError, match="samples lie in the 20 ms before the window"):
-        fit_start(record(59.94), -0.0005, 0.020)
+        steady_before(record(59.94), -0.0005, 0.020)
