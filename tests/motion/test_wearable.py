@@ -5,10 +5,12 @@ import shutil
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from replay.errors import InputError, InputErrors
 from replay.motion import Impact, Kinematics, build_driver, check_tracks, reconstruct
 from replay.motion.kinematics import STANDARD_GRAVITY
+from replay.motion.synthetic.headform import headform_record
 from replay.play import Window, load_play
 
 
@@ -183,3 +185,18 @@ def test_measured_impacts_keep_their_peaks(shared, tmp_path, number):
     assert driver.quality.overshoot_acceleration_percent < 1.0
     inside = (k.time_s >= driver.start_s) & (k.time_s <= driver.start_s + 0.030)
     assert driver.motion.linear_resultant.max() == pytest.approx(a[inside].max(), rel=0.02)
+
+
+def test_a_motion_read_from_its_file_is_worn_by_a_headform_without_loss(tmp_path):
+    time = np.arange(301) * 1e-4
+    turn = Rotation.from_rotvec(np.outer(20.0 * time, [0.0, 0.0, 1.0]))
+    pushed = np.tile([300.0, 0.0, 0.0], (len(time), 1))
+    spin = np.tile([0.0, 0.0, 20.0], (len(time), 1))
+    still = np.zeros((len(time), 3))
+    Kinematics(time, still, turn, still, pushed, spin, still).write(tmp_path / "head_motion.csv")
+    text = headform_record(Kinematics.read(tmp_path / "head_motion.csv"), seed=1)
+    table = np.array([line.split(",") for line in text.splitlines()[1:]], float)
+    assert table[:200, 1:4].std() < 0.5, "the head goes on as it begins before the motion"
+    expected = turn.inv().apply(pushed) / 9.80665
+    assert np.abs(table[200:, 1:4] - expected).max() < 6 * 0.3
+    assert np.abs(table[200:, 6] - np.degrees(20.0)).max() < 6 * 3.0

@@ -138,7 +138,8 @@ class Kinematics:
         frame = DRIVER.read(path)
 
         def triple(template: str) -> np.ndarray:
-            return frame[[template.format(axis) for axis in "xyz"]].to_numpy()
+            # a copy: a view of a table may not be written, and rotations refuse what may not be
+            return frame[[template.format(axis) for axis in "xyz"]].to_numpy(copy=True)
 
         return cls(
             time_s=frame["time_s"].to_numpy(),
