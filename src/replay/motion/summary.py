@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from replay.motion.reconstruct import Reconstruction
 
 _WIDTH = 116
+_CAVEATS = {"onset_s": "; of filmed measured impacts, only half began inside such a band"}
+"""What docs/accuracy.md says of a band that does not keep its promise on every family."""
 
 
 def _before(result: Reconstruction) -> list[str]:
@@ -43,7 +45,7 @@ def _in_short(result: Reconstruction) -> list[str]:
         label, unit, scale = UNITS[name]
         if bands[name].resolved:
             told = bands[name].text(scale, ".1f" if unit == "ms" else ".3g")
-            lines.append(f"  {label:38s} {told} {unit}")
+            lines.append(f"  {label:38s} {told} {unit}{_CAVEATS.get(name, '')}")
     if lines[-1].startswith("RESOLVED"):
         lines.append("  nothing")
     missing = [f"  {UNITS[name][0]}" for name in QUANTITIES if not bands[name].resolved]
