@@ -40,7 +40,10 @@ def _in_short(result: Reconstruction) -> list[str]:
     assert result.posterior_quality is not None
     bands, seen = result.posterior_quality.bands, result.posterior_quality.event_probability
     lines = [f"NO IMPACT is seen: its probability is {seen:.2g}; a slow turn fits the clicks"] * (seen < LEAST_EVENT)
-    lines.append("RESOLVED by this footage: value, and where the truth lies 19 times in 20")
+    promise = "where the truth lies 19 times in 20"
+    if result.posterior_quality.band_class != "calibrated":
+        promise = "a band that was not calibrated for footage like this"
+    lines.append(f"RESOLVED by this footage: value, and {promise}")
     for name in QUANTITIES:
         label, unit, scale = UNITS[name]
         if bands[name].resolved:
