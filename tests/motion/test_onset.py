@@ -79,6 +79,18 @@ def test_velocities_before_the_impact_are_those_of_the_head_before_it(found):
     assert before.motion.omega_resultant[0] < 0.1 * IMPACT.at(np.array([0.008])).omega_resultant[0]
 
 
+def test_a_zooming_lens_is_not_taken_for_a_head_that_comes_closer(found):
+    camera = SyntheticCamera(119.88, -18, 18, (1920, 1080), 8000.0, landmarks=SIX, zoom_per_s=0.4)
+    _, posterior = reconstructed(film(IMPACT, camera, seed=3, flaws=Flaws(click_sigma_px=1.0)))
+    before, truth = posterior.before, IMPACT.at(np.array([true_onset()]))
+    away = (before.motion.velocity_m_per_s - truth.velocity_m_per_s)[0]
+    assert np.all(np.abs(away) < 3.0 * before.sigma_velocity_m_per_s)
+    # clicks from 20 m tell nothing of the lens: 0.3 per second of it are 6 m/s along the line of sight, none across
+    assert before.sigma_velocity_m_per_s[1] == pytest.approx(6.0, rel=0.1)
+    assert before.sigma_velocity_m_per_s[0] < 0.5
+    assert found[1].before.sigma_velocity_m_per_s[1] < 3.0
+
+
 @pytest.mark.parametrize("scales", [ANGULAR, LINEAR], ids=["angular", "linear"])
 def test_frames_after_the_onset_have_no_say(scales):
     time = np.arange(20) / 60.0

@@ -84,13 +84,13 @@ def test_the_read_out_does_not_care_for_the_axes():
 def test_a_band_is_the_centre_shifted_and_widened():
     found = spread("omega_rad_per_s", np.exp(np.random.default_rng(0).normal(np.log(30.0), 0.1, 4000)))
     assert found.width == pytest.approx(0.1, rel=0.05)
-    made = Calibration((0.05, 0.2), (0.0, 1.0), (2.0, 4.0), (3.0, 6.0))
-    known = replace(constants(), rates=(60.0,), peaks={"omega_rad_per_s": (made,)})
-    told = known.apply("omega_rad_per_s", found, 100.0)
+    made = Calibration((0.05, 0.2), (0.0, 1.0), (2.0, 4.0), (3.0, 6.0), factor=(1.0, 2.0))
+    known = replace(constants(), rates=(60.0, 240.0), peaks={"omega_rad_per_s": made})
+    told = known.apply("omega_rad_per_s", found, 120.0)
     assert np.log(told.value / 30.0) == pytest.approx(0.05, abs=0.01)
-    # the middle of the knots, in the logarithm of the width
-    assert np.log(told.value / told.low) == pytest.approx(0.3, rel=0.06)
-    assert np.log(told.high / told.value) == pytest.approx(0.45, rel=0.06)
+    # the middle of the knots, in the logarithm of the width; the middle of the rates, in theirs
+    assert np.log(told.value / told.low) == pytest.approx(1.5 * 0.3, rel=0.06)
+    assert np.log(told.high / told.value) == pytest.approx(1.5 * 0.45, rel=0.06)
 
 
 def test_a_band_that_spans_too_much_is_said_in_words():

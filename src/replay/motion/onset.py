@@ -14,9 +14,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from replay.errors import InputError
+from replay.motion.batch import Problem
 from replay.motion.kinematics import Kinematics
 from replay.motion.readout import ANGULAR, LINEAR, read_quiet
-from replay.motion.settings import CameraSettings
 from replay.motion.told import Told, Turning
 
 MAJOR, BEGUN = 0.5, 0.1
@@ -60,18 +60,23 @@ def contact_index(alpha: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     return np.minimum(onset_index(alpha), onset_index(acceleration))
 
 
-def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera: CameraSettings) -> BeforeOnset:
+def before_onset(
+    turning: Turning, position: Told, focal: np.ndarray, onsets_s: np.ndarray, problem: Problem
+) -> BeforeOnset:
     """Fit the slow motion of a head to the frames that are surely before the impact.
 
     Parameters
     ----------
     turning, position
         Orientation, and CG in camera axes, as the frames tell them.
+    focal
+        ``(k,)`` information on log f of each frame.
     onsets_s
         ``(draws,)`` onsets of the drawn motions [s]: frames before their lowest twentieth are used.
-    camera
-        Axes of camera and head.
+    problem
+        Axes of camera and head, and what the lens may do.
     """
+    camera = problem.camera
     until, at = float(np.quantile(onsets_s, _SURELY_BEFORE)), float(np.median(onsets_s))
     spin = read_quiet(turning.told, ANGULAR, until, at)
     centre = position.values.mean(axis=0)
@@ -82,6 +87,10 @@ def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera:
     turned = to_global * base[here] * Rotation.from_rotvec(spin.level - level[here])
     body, ray = turned.as_matrix(), to_global.as_matrix()
     omega, velocity = body @ spin.rate, ray @ path.rate
+    # a lens that zooms looks like a head that comes closer
+    used = position.time_s < until
+    closer = (path.level + centre) * zoom_rate_sigma(position.time_s[used], focal[used], problem)
+    unsure = path.covariance + np.outer(closer, closer)
     motion = Kinematics(
         time_s=np.array([at]),
         position_m=to_global.apply(path.level + centre)[None],
@@ -94,9 +103,21 @@ def before_onset(turning: Turning, position: Told, onsets_s: np.ndarray, camera:
     return BeforeOnset(
         frames=int(np.sum(turning.told.time_s < until)),
         motion=motion,
-        sigma_velocity_m_per_s=np.sqrt(np.diag(ray @ path.covariance @ ray.T)),
+        sigma_velocity_m_per_s=np.sqrt(np.diag(ray @ unsure @ ray.T)),
         sigma_omega_rad_per_s=np.sqrt(np.diag(body @ spin.covariance @ body.T)),
     )
+
+
+def zoom_rate_sigma(time_s: np.ndarray, focal: np.ndarray, problem: Problem) -> float:
+    """Standard deviation of the rate of log f [1/s], from information on it ``(k,)`` at some times; 0 for a fixed lens.
+
+    The batch's own spread will not do: it takes what a lens does between every two frames for a matter of its own,
+    where a lens that zooms does so throughout.
+    """
+    if problem.camera.lens != "zoom":
+        return 0.0
+    away = time_s - np.average(time_s, weights=focal)
+    return float((problem.smoothness.zoom_per_s**-2 + focal @ away**2) ** -0.5)
 
 
 def steady_before(kinematics: Kinematics, end_s: float, fit_s: float) -> Kinematics:

@@ -15,7 +15,7 @@ from replay.motion.onset import BeforeOnset, before_onset, contact_index
 from replay.motion.protocol import ProtocolMotion, lens_of
 from replay.motion.readout import ANGULAR, LINEAR, read_out
 from replay.motion.settings import CameraSettings
-from replay.motion.told import Told, Turning, position_told, window
+from replay.motion.told import Told, Turning, focal_told, position_told, window
 from replay.motion.tracks import Template, Tracks
 
 DRAWS = 200
@@ -200,12 +200,13 @@ def reconstruct_posterior(
     time = tracks.frames / camera.fps
     read = [_read_path(p, problem, time, rng, int(n), to_head) for p, n in zip(paths, counts) if n > 0]
     drawn = read[0].draws if len(read) == 1 else _joined([path.draws for path in read])
+    focal = focal_told(paths[0], problem, window(paths[0].state, time))
     onsets = drawn.peaks(float(time[1] - time[0]))["onset_s"]
     return PosteriorMotion(
         draws=drawn,
         frames_s=time,
         batch=paths[0],
-        before=before_onset(read[0].turning, read[0].position, onsets, camera),
+        before=before_onset(read[0].turning, read[0].position, focal, onsets, problem),
         flip_margin=float(0.5 * (costs[1] - costs[0])) if len(costs) > 1 else float("inf"),
         event_probability=float(np.dot([path.event_probability for path in read], counts[counts > 0]) / counts.sum()),
         null_peak_rad_per_s=_null_peak(paths[0], time, rng) if null else float("nan"),

@@ -192,11 +192,13 @@ def video_quality(
         )
     if not motion.used.all():
         warnings.append(f"{int((~motion.used).sum())} frames with fewer than 3 landmarks are bridged")
-    for name, label in (("alpha_rad_per_s2", "angular acceleration"), ("a_m_per_s2", "linear acceleration")):
+    for name, label, unit in (
+        ("alpha_rad_per_s2", "angular acceleration", "rad/s^2"),
+        ("a_m_per_s2", "linear acceleration", "m/s^2"),
+    ):
         if peaks[name] < 2.0 * nulls[name]:
-            warnings.append(
-                f"peak {label} {peaks[name]:.4g} is not told from noise (a head without impact shows {nulls[name]:.4g})"
-            )
+            peak, null = f"{peaks[name]:.4g} {unit}", f"{nulls[name]:.4g}"
+            warnings.append(f"peak {label} {peak} is not told from noise (a head without impact shows {null})")
     if not measured:
         warnings.append(f"click noise is taken from the camera file ({sigma:g} px): residuals cannot tell it")
     return ReconstructionQuality(

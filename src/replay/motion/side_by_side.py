@@ -272,7 +272,7 @@ def advice(quality: PosteriorQuality, tracks: Tracks, camera: CameraSettings, sc
     if camera.fps < 115.0:
         mend.append(
             f"frame rate: {1e3 / camera.fps:.0f} ms between frames is as long as an impact; 240 fps narrows the band "
-            "of peak angular velocity to a third"
+            "of peak angular velocity by a third"
         )
     if scale_px_per_m < 300.0:
         mend.append(f"closeness: {scale_px_per_m:.0f} px/m; zooming in to 300 px/m or more narrows every band")

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from replay.motion.reconstruct import Reconstruction
 
 _WIDTH = 116
+_CAVEATS = {"onset_s": "; of filmed measured impacts, only half began inside such a band"}
+"""What docs/accuracy.md says of a band that does not keep its promise on every family."""
 
 
 def _before(result: Reconstruction) -> list[str]:
@@ -38,12 +40,15 @@ def _in_short(result: Reconstruction) -> list[str]:
     assert result.posterior_quality is not None
     bands, seen = result.posterior_quality.bands, result.posterior_quality.event_probability
     lines = [f"NO IMPACT is seen: its probability is {seen:.2g}; a slow turn fits the clicks"] * (seen < LEAST_EVENT)
-    lines.append("RESOLVED by this footage: value, and where the truth lies 19 times in 20")
+    promise = "where the truth lies 19 times in 20"
+    if result.posterior_quality.band_class != "calibrated":
+        promise = "a band that was not calibrated for footage like this"
+    lines.append(f"RESOLVED by this footage: value, and {promise}")
     for name in QUANTITIES:
         label, unit, scale = UNITS[name]
         if bands[name].resolved:
             told = bands[name].text(scale, ".1f" if unit == "ms" else ".3g")
-            lines.append(f"  {label:38s} {told} {unit}")
+            lines.append(f"  {label:38s} {told} {unit}{_CAVEATS.get(name, '')}")
     if lines[-1].startswith("RESOLVED"):
         lines.append("  nothing")
     missing = [f"  {UNITS[name][0]}" for name in QUANTITIES if not bands[name].resolved]

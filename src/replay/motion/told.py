@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from replay.motion.batch import Batch, Problem, State, cross_matrix
+from replay.motion.batch import Batch, Problem, State, cross_matrix, reference_terms
 from replay.motion.camera import translation
 
 _MOST_FRAMES = 120
@@ -112,6 +112,13 @@ def position_told(
     total = move @ inverse @ np.swapaxes(move, 1, 2) + spread @ covariance @ np.swapaxes(spread, 1, 2)
     position = origin + arm + np.einsum("kij,kj->ki", move, step) - np.cross(arm, turn)
     return Told(time_s[kept], position, np.linalg.inv(total))
+
+
+def focal_told(batch: Batch, problem: Problem, kept: slice) -> np.ndarray:
+    """Information ``(k,)`` on log f of each kept frame: by its clicks' perspective, and where it is known by frame."""
+    information, _ = marginal(batch.clicks_information[kept], batch.clicks_gradient[kept], slice(6, 7), slice(0, 6))
+    known = sum(1.0 / sigma**2 for column, _, sigma in reference_terms(problem) if column == 6)
+    return np.maximum(information[:, 0, 0], 0.0) + known + 1e-12
 
 
 def window(state: State, time: np.ndarray) -> slice:
