@@ -179,6 +179,7 @@ def write_model_file(
     out: Path,
     preview: Path | None,
     body: dict[str, Any] | None = None,
+    apparatus: str | None = None,
 ) -> int:
     """Build a model by itself, print its tables and write it.
 
@@ -192,7 +193,16 @@ def write_model_file(
         Files to write.
     body
         ``posture``, and fields of `replay.models.BodyPlan`; none for a head and helmet alone.
+    apparatus
+        Name of a laboratory's apparatus, to be built in place of them.
     """
+    if apparatus is not None:
+        model = models.build_apparatus(apparatus, resolution)
+        models.write_model(out, model)
+        print(models.summary_text(model))
+        if preview is not None:
+            models.write_preview(preview, model)
+        return 0
     helmet, *others = pieces
     model = models.build_model(preset, resolution, design=models.load_design(helmet or "classic", *others))
     if body is not None:
