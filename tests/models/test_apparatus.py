@@ -27,7 +27,7 @@ from replay.models.quality import aspect_ratios, hex_volumes, scaled_jacobians
 def test_every_apparatus_is_a_good_mesh_at_every_resolution(name: str, resolution: str) -> None:
     model = build_apparatus(name, resolution)
     assert scaled_jacobians(model.nodes, model.hexes).min() > 0.6
-    assert aspect_ratios(model.nodes, model.hexes).max() < 9.0
+    assert aspect_ratios(model.nodes, model.hexes).max() < 8.0
     assert hex_volumes(model.nodes, model.hexes).min() > 0.0
     assert len(np.unique(model.hexes)) == len(model.nodes)
     told = apparatus_inspection(model)

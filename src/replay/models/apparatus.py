@@ -25,12 +25,12 @@ from replay.models.regions import REGION_NAMES
 from replay.play import Positive, Vector3
 
 Name = Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$")]
-DIVISIONS = {"tiny": 4, "coarse": 6, "medium": 10, "fine": 16}
+DIVISIONS = {"tiny": 6, "coarse": 8, "medium": 12, "fine": 16}
 """Cells along an edge of a layer's core, by resolution."""
 _WHERE = "play.yaml"
 _CORE = 0.62  # half the core's diagonal over the radius
 _ROUND = 0.5
-_ROLES = {"crushable_foam": "cushion", "rigid": "mount"}
+_LEAST_LAYERS = 3  # of what deforms: fewer are carried by hourglass stiffness
 _NOTE = "the layers of the apparatus are bonded to one another and share nodes"
 
 
@@ -136,10 +136,9 @@ def build_apparatus(name: str, resolution: str) -> Model:
     design, divisions = load_apparatus(name), DIVISIONS[resolution]
     nodes, hexes, layer_of = _stack(design, divisions)
     nodes = np.round(nodes, GRID_DECIMALS) + 0.0
-    laws = [design.materials[layer.material].law for layer in design.layers.values()]
     parts = tuple(
-        Part(APPARATUS + layer.pid, name, _ROLES.get(law, "cap"), "apparatus", layer.material)
-        for (name, layer), law in zip(design.layers.items(), laws)
+        Part(APPARATUS + layer.pid, name, _role(design, name), "apparatus", layer.material)
+        for name, layer in design.layers.items()
     )
     materials = {part.material: design.materials[part.material].model_dump() for part in parts}
     ballast = parts[-1].material
@@ -183,9 +182,8 @@ def _stack(design: Apparatus, divisions: int) -> tuple[np.ndarray, np.ndarray, n
     for k, layer in enumerate(design.layers.values()):
         behind -= layer.thickness_m
         thick = (float(planes[-1].mean()) - behind) / edge
-        # what deforms has two layers at least, but for a cap whose rim would become a sheet
-        least = 2 if layer.thickness_m > edge / 2 else 1
-        count = max(1, round(thick / 2)) if _rigid(design, layer) else max(least, round(thick))
+        # hexes twice as thick as wide: a foam that bottoms out snaps sideways at its free edge where they are flat
+        count = max(1 if _rigid(design, layer) else _LEAST_LAYERS, round(thick / 2))
         share = np.arange(1, count + 1)[:, None] / count
         planes += list((1 - share) * planes[-1] + share * behind)
         layer_of += [k] * count
@@ -194,6 +192,14 @@ def _stack(design: Apparatus, divisions: int) -> tuple[np.ndarray, np.ndarray, n
         [np.hstack([quads + (k + 1) * len(disc), quads + k * len(disc)]) for k in range(len(layer_of))]
     )
     return nodes, hexes, np.repeat(layer_of, len(quads))
+
+
+def _role(design: Apparatus, name: str) -> str:
+    """The last layer holds the others; of these a foam is crushed, and anything else is there to be struck."""
+    if name == list(design.layers)[-1]:
+        return "mount"
+    law = design.materials[design.layers[name].material].law
+    return "cushion" if law == "crushable_foam" else "cap"
 
 
 def _rigid(design: Apparatus, layer: Layer) -> bool:

@@ -52,8 +52,9 @@ def show_verdict(results: Path) -> int:
     if not path.is_file():
         raise InputError(path, "there is no verdict here", mend=f"run `make run PLAY={results.name}` first")
     verdict = read_json(path)
-    collision = read_json(results / "settings" / "play.json").get("collision")
-    limits = Limits.load(mode="collision" if collision else "driver")
+    play = read_json(results / "settings" / "play.json")
+    recorded = play.get("source", {}).get("kind") != "none"
+    limits = Limits.load(mode="collision" if play.get("collision") else "driver", recorded=recorded)
     found: dict[str, Gate] = {}
     for stage, files in ALL_GATE_FILES.items():
         for file in files:
