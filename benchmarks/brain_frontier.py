@@ -68,7 +68,7 @@ def main() -> None:
                 method="SLSQP",
                 bounds=[*map(tuple, box), (0.0, None)],
                 constraints={"type": "ineq", "fun": lambda z, w=within: _room(ratios(z[:-1]), z[-1], w)},
-                options={"maxiter": asked.iterations, "ftol": 1e-5},
+                options={"maxiter": asked.iterations, "ftol": 1e-5, "eps": 1e-4},
             )
             feasible = _room(ratios(found.x[:-1]), found.x[-1], within).min() > -2e-3
             if feasible and (best is None or found.x[-1] < best.x[-1]):
