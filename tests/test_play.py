@@ -8,7 +8,7 @@ import pytest
 from replay.errors import InputError, InputErrors
 from replay.play import Play, load_play, play_schema, play_schema_text
 
-PLAYS = ("demo", "broadcast", "wearable", "collision-demo")
+PLAYS = ("demo", "broadcast", "wearable", "collision-demo", "linear-impactor", "drop")
 
 
 @pytest.fixture
@@ -202,3 +202,29 @@ def test_the_start_of_a_player_whom_nobody_filmed_cannot_be_reconstructed(collis
     assert "start of the impactor is to be reconstructed, but the tracks show the other player" in message(collision)
     spoil(collision, "tracked: struck", "tracked: impactor")
     assert load_play(collision / "play.yaml").collision.impactor.start.fit_s == 0.020
+
+
+@pytest.fixture
+def laboratory(tmp_path, repository):
+    """A copy of the linear impactor's play that a test may spoil."""
+    return shutil.copytree(repository / "config" / "plays" / "linear-impactor", tmp_path / "linear-impactor")
+
+
+def test_a_play_of_which_nothing_was_recorded_needs_a_collision_with_given_starts(laboratory):
+    play = load_play(laboratory / "play.yaml")
+    assert (play.mode, play.recorded, play.files) == ("collision", False, ())
+    text = (laboratory / "play.yaml").read_text()
+    (laboratory / "play.yaml").write_text(text[: text.index("collision:")])
+    assert "nothing was recorded, and nothing says how the head moves" in message(laboratory)
+
+
+def test_an_apparatus_strikes_alone_and_says_the_closing_speed_alone(laboratory):
+    spoil(laboratory, "struck: {name: headform}", "struck: {start: {kind: given, velocity_m_per_s: [1.0, 0.0, 0.0]}}")
+    assert "the struck player has a velocity of their own" in message(laboratory)
+    spoil(laboratory, "struck: {start: {kind: given, velocity_m_per_s: [1.0, 0.0, 0.0]}}", "impactor: {name: another}")
+    assert "an `impactor`, or an `apparatus` of a laboratory" in message(laboratory)
+
+
+def test_friction_is_between_the_helmet_and_whatever_strikes_it(laboratory, collision):
+    of = {folder.name: load_play(folder / "play.yaml").collision.pairs for folder in (laboratory, collision)}
+    assert [pair.second for pairs in of.values() for pair in pairs] == ["apparatus", "helmet_2"]

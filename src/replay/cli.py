@@ -148,6 +148,9 @@ def _parser() -> argparse.ArgumentParser:
             metavar="NAME",
             help=f"{text}, or a YAML file (default: the helmet's)",
         )
+    model.add_argument(
+        "--apparatus", metavar="NAME", help="a laboratory's apparatus in place of a head: linear_impactor, drop_anvil"
+    )
     model.add_argument("--out", type=Path, required=True, metavar="MODEL.h5")
     model.add_argument("--preview", type=Path, metavar="PICTURE.png", help="also draw it")
     model.add_argument("--body", metavar="POSTURE", help="a body in this posture, by name or YAML file of joint angles")
@@ -373,6 +376,7 @@ def _run_tool(arguments: argparse.Namespace) -> int:
             arguments.out,
             arguments.preview,
             _body(arguments),
+            arguments.apparatus,
         ),
         "solve": lambda: explicit.solve_model(
             arguments.model,

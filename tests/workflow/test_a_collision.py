@@ -51,3 +51,7 @@ def test_the_page_of_a_collision_has_the_blow_and_published_numbers(collided: Ch
 
 def test_a_second_run_of_a_collision_does_nothing(collided: Checkout) -> None:
     assert "Nothing to be done" in collided.replay(PLAY, cores=1)
+
+
+def test_a_laboratorys_test_has_no_reconstruction_and_no_fidelity(collided: Checkout) -> None:
+    assert set(collided.planned("drop")) == {*STAGES, "place"} - {"reconstruct", "fidelity"}

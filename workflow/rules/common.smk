@@ -153,11 +153,23 @@ def placement(wildcards):
     return [of("placement")(wildcards)] if said(play).get("collision") else []
 
 
+def recorded(wildcards):
+    """Whether the head's motion was recorded; without a record nothing is reconstructed and nothing compared."""
+    source = said(wildcards.play.partition(".")[0]).get("source")
+    return not isinstance(source, dict) or source.get("kind") != "none"
+
+
+def reconstruction(wildcards):
+    """The reconstruction, of a play that has a record."""
+    return [of("reconstruction")(wildcards)] if recorded(wildcards) else []
+
+
 def evidence(*more):
     """Manifests of every stage before the verdict that a play of its mode has, and more."""
 
     def manifests(wildcards):
-        return [*map(stage, (*EVIDENCE, *more)), *placement(wildcards)]
+        here = [s for s in EVIDENCE if recorded(wildcards) or s not in OF_RECORDS]
+        return [*map(stage, (*here, *more)), *placement(wildcards)]
 
     return manifests
 
@@ -195,6 +207,7 @@ EVIDENCE = (
     "fidelity",
     "measures",
 )
+OF_RECORDS = ("reconstruction", "fidelity")
 SEASON = tuple(ROWS) or tuple(config["plays"])
 
 

@@ -59,7 +59,12 @@ rule bands:
             play=wildcards.play,
             ensemble=wildcards.ensemble,
             member=members(f"{wildcards.play}.{wildcards.ensemble}"),
-            stage=("settings", "replay", "fidelity", "measures"),
+            stage=[
+                "settings",
+                "replay",
+                *(["fidelity"] if recorded(wildcards) else []),
+                "measures",
+            ],
         ),
         of_play="results/{play}/measures/manifest.json",
         code=code("bands"),

@@ -99,7 +99,7 @@ rule reconstruct:
 rule drive:
     input:
         settings=stage("settings"),
-        reconstruction=of("reconstruction"),
+        reconstruction=reconstruction,
         code=code("drive"),
     output:
         stage("driver"),

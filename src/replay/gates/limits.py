@@ -104,6 +104,7 @@ class GateFacts:
     source: str
     between_plays: bool = False
     mode: str = ""
+    of_record: bool = False
 
 
 class Limits:
@@ -117,10 +118,19 @@ class Limits:
         Facts of each gate, in the order of the protocol.
     mode
         Of the play: a gate that is for another mode is not asked for.
+    recorded
+        Whether the play has a record of the head's motion; without one no gate on it is asked for.
     """
 
-    def __init__(self, limits: Mapping[str, Limit], gates: Mapping[str, GateFacts], mode: str = "driver") -> None:
-        self.mode = mode
+    def __init__(
+        self,
+        limits: Mapping[str, Limit],
+        gates: Mapping[str, GateFacts],
+        mode: str = "driver",
+        *,
+        recorded: bool = True,
+    ) -> None:
+        self.mode, self.recorded = mode, recorded
         self._limits = MappingProxyType(dict(limits))
         self.gates = MappingProxyType(dict(gates))
 
@@ -130,12 +140,17 @@ class Limits:
         return {
             name: facts
             for name, facts in self.gates.items()
-            if not facts.between_plays and facts.mode in ("", self.mode)
+            if not facts.between_plays and facts.mode in ("", self.mode) and (self.recorded or not facts.of_record)
         }
 
     @classmethod
     def load(
-        cls, overrides: Mapping[str, Any] | None = None, *, file: str | Path = "play.yaml", mode: str = "driver"
+        cls,
+        overrides: Mapping[str, Any] | None = None,
+        *,
+        file: str | Path = "play.yaml",
+        mode: str = "driver",
+        recorded: bool = True,
     ) -> Limits:
         """Load the shipped limits and apply a play's settings.
 
@@ -148,6 +163,8 @@ class Limits:
             Named in errors: where the overrides were written.
         mode
             Of the play, ``driver`` or ``collision``.
+        recorded
+            Whether the play has a record of the head's motion.
 
         Raises
         ------
@@ -163,7 +180,7 @@ class Limits:
                 errors.append(error)
         if errors:
             raise errors[0] if len(errors) == 1 else InputErrors(errors)
-        return cls(changed, gates, mode)
+        return cls(changed, gates, mode, recorded=recorded)
 
     def __getitem__(self, name: str) -> Limit:
         return self._limits[name]

@@ -26,6 +26,7 @@ VIDEO_PACKAGE = (
     "qc_per_frame.csv",
     *_SHARED_ITEMS,
 )
+UNRECORDED_PACKAGE = tuple(item for item in _SHARED_ITEMS if item not in ("kinematics.csv", "applied driver"))
 WEARABLE_PACKAGE = ("wearable kinematics", "initial_conditions_t0.csv", "qc_summary.txt", *_SHARED_ITEMS)
 
 
@@ -42,7 +43,7 @@ def package_gate(
     limits
         The limits in force.
     required
-        `VIDEO_PACKAGE` or `WEARABLE_PACKAGE`.
+        `VIDEO_PACKAGE`, `WEARABLE_PACKAGE` or `UNRECORDED_PACKAGE`.
     """
     judge = Judge("package", limits)
     for item in required:

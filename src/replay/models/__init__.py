@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from replay.models.apparatus import Apparatus, apparatus_names, build_apparatus, load_apparatus
 from replay.models.body.player import BodyPlan, with_body
 from replay.models.body.posture import Posture, posture_names
 from replay.models.build import build_model
 from replay.models.comparison import comparison_text
 from replay.models.helmet_design import HelmetDesign, load_design
-from replay.models.inspection import assembly_inspection, assembly_mass, helmet_inspection, mass_report
+from replay.models.inspection import (
+    apparatus_inspection,
+    assembly_inspection,
+    assembly_mass,
+    helmet_inspection,
+    mass_report,
+)
 from replay.models.materials import brain_material, brain_parameters, brain_sets, load_materials
 from replay.models.membranes import CableNet, falx, tentorium
 from replay.models.model import Model, ModelJoint, Part, read_model, write_model
@@ -27,6 +34,7 @@ def write_preview(path: str | Path, model: Model) -> None:
 
 __all__ = [
     "PARTS",
+    "Apparatus",
     "BodyPlan",
     "CableNet",
     "HelmetDesign",
@@ -34,15 +42,19 @@ __all__ = [
     "ModelJoint",
     "Part",
     "Posture",
+    "apparatus_inspection",
+    "apparatus_names",
     "assembly_inspection",
     "assembly_mass",
     "brain_material",
     "brain_parameters",
     "brain_sets",
+    "build_apparatus",
     "build_model",
     "comparison_text",
     "falx",
     "helmet_inspection",
+    "load_apparatus",
     "load_design",
     "load_materials",
     "mass_report",

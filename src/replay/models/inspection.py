@@ -202,6 +202,22 @@ def assembly_inspection(
     }
 
 
+def apparatus_inspection(model: Model) -> dict[str, Any]:
+    """Numbers for the assembly gate of a laboratory's apparatus; what is asked of heads has no power and says so."""
+    outside, loose = parts_outside_block(model), unconnected_parts(model)
+    headless = ("helmet_mass_difference_kg", "helmet_cg_difference_m", "head_mass_kg", "head_cg_offset_m")
+    return {
+        **dict.fromkeys(headless, "an apparatus has neither head nor helmet"),
+        "mass_kg": assembly_mass(model).mass_kg,
+        "duplicate_part_ids": len(model.parts) - len({part.pid for part in model.parts}),
+        "parts_outside_block": len(outside),
+        "parts_outside_block_detail": ", ".join(outside),
+        "unconnected_parts": len(loose),
+        "unconnected_parts_detail": ", ".join(loose),
+        "min_scaled_jacobian": float(scaled_jacobians(model.nodes, model.hexes).min()),
+    }
+
+
 def parts_outside_block(model: Model) -> list[str]:
     """Names of the parts whose number lies outside the block of their player's assembly (protocol 1.6)."""
     block = [PLAYERS[model.info.get("player", part.player)].of(part.assembly) for part in model.parts]

@@ -39,6 +39,9 @@ ROLES = (
     "strap",
     "bone",
     "flesh",
+    "cap",
+    "cushion",
+    "mount",
     "other",
 )
 
@@ -66,7 +69,7 @@ class Part:
     role
         One of `ROLES`.
     assembly
-        ``head``, ``helmet`` or ``body``.
+        ``head``, ``helmet`` or ``body``; ``apparatus`` of a laboratory.
     material
         Key of the model's `materials`.
     """
@@ -79,8 +82,8 @@ class Part:
 
     @property
     def player(self) -> int:
-        """1, or 2 for a part whose number lies in a block of the second player."""
-        return 2 if self.pid // 10_000_000 in (2, 4) else 1
+        """1, or 2 for a part whose number lies in a block of the second player or of what strikes in his place."""
+        return 2 if self.pid // 10_000_000 in (2, 3, 4) else 1
 
 
 @dataclass(frozen=True)

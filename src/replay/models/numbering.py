@@ -12,6 +12,8 @@ from replay.models.materials import MATERIAL_OF_ROLE
 from replay.models.model import Part
 
 BLOCK_SIZE = 10_000_000
+APPARATUS = 30_000_000
+"""Block of a laboratory's apparatus, which takes the second player's place."""
 _HEAD_PARTS = {"grey_matter": 1, "csf": 2, "skull": 3, "white_matter": 4, "scalp": 9020, "face": 9021}
 _HEAD_ROLES = {"grey_matter": "brain", "white_matter": "brain"}
 
@@ -33,8 +35,8 @@ class Blocks:
     helmet: int
 
     def of(self, assembly: str) -> tuple[int, int]:
-        """First and last number of the block of ``head``, ``body`` or ``helmet``."""
-        first = self.helmet if assembly == "helmet" else self.head
+        """First and last number of the block of ``head``, ``body``, ``helmet`` or ``apparatus``."""
+        first = {"helmet": self.helmet, "apparatus": APPARATUS}.get(assembly, self.head)
         return first, first + BLOCK_SIZE - 1
 
     @property

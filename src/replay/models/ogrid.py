@@ -40,7 +40,7 @@ RESOLUTIONS = {
     "tiny": Resolution(6, brain=2, csf=1, skull=1, scalp=1, comfort=2, energy=4, facemask_step_m=0.020),
     "coarse": Resolution(10, brain=4, csf=1, skull=1, scalp=2, comfort=1, energy=2, facemask_step_m=0.013),
     "medium": Resolution(18, brain=11, csf=1, skull=3, scalp=3, comfort=1, energy=3, facemask_step_m=0.008),
-    "fine": Resolution(32, brain=18, csf=2, skull=3, scalp=4, comfort=2, energy=5, facemask_step_m=0.006),
+    "fine": Resolution(32, brain=18, csf=2, skull=4, scalp=4, comfort=2, energy=5, facemask_step_m=0.006),
 }
 
 

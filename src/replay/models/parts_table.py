@@ -23,8 +23,8 @@ PARTS = TableFormat(
     (
         Column("pid", "part number", "int"),
         Column("name", "name of the part", "text"),
-        Column("role", "what it is: brain, csf, skull, ..., shell, facemask, chin_cup, bone, flesh", "text"),
-        Column("assembly", "head, helmet or body", "text"),
+        Column("role", "what it is: brain, csf, skull, ..., shell, facemask, chin_cup, bone, flesh, cap", "text"),
+        Column("assembly", "head, helmet or body; apparatus of a laboratory", "text"),
         Column("material", "name of the material", "text"),
         Column("law", "material law", "text"),
         Column("elements", "hexahedra", "int"),
@@ -105,7 +105,7 @@ def summary_text(model: Model) -> str:
             f"{table['volume_m3'][k] * 1e6:>10.2f} {table['mass_kg'][k]:>8.4f} "
             f"{table['min_scaled_jacobian'][k]:>7.3f} {'rigid' if np.isnan(step) else f'{step * 1e6:.3f}':>7}"
         )
-    for assembly in ("head", "helmet", "body"):
+    for assembly in ("head", "helmet", "body", "apparatus"):
         total = sum(m for m, a in zip(table["mass_kg"], table["assembly"]) if a == assembly)
         if assembly in table["assembly"]:
             lines.append(f"{'':>9} {assembly:24} {'':17} {'':>6} {'':>10} {total:>8.4f}")

@@ -31,6 +31,9 @@ _COLOURS = {
     "chin_cup": "#e07a3f",
     "bone": "#e9dcc0",
     "flesh": "#c98f78",
+    "cap": "#d8cfa8",
+    "cushion": "#5f7f5a",
+    "mount": "#70757d",
 }
 _LIGHT = np.array([-0.35, 0.45, 0.82])
 
@@ -51,9 +54,10 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
     FigureCanvasAgg(figure)
     centroid = model.nodes[model.hexes].mean(axis=1)
     everything = np.ones(len(model.hexes), dtype=bool)
+    plane = "axis" if "apparatus" in model.info else "mid-sagittal plane"
     views = (
         ("outside", everything, 38.0, 14.0),
-        ("cut along the mid-sagittal plane", centroid[:, 1] < 0, 90.0, 0.0),
+        (f"cut along the {plane}", centroid[:, 1] < 0, 90.0, 0.0),
     )
     for k, (title, shown, azimuth, elevation) in enumerate(views):
         axes = figure.add_axes((0.01 + 0.5 * k, 0.12, 0.48, 0.78))

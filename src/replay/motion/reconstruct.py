@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from replay.errors import InputError
 from replay.files import write_text
 from replay.motion.clip import load_clip
 from replay.motion.driver import Driver, build_driver
@@ -240,6 +241,8 @@ def check_tracks(play: Play) -> dict[str, Any]:
             "rate_hz": float(1.0 / np.median(np.diff(time))),
             "channels": list(channels),
         }
+    if not isinstance(source, ClicksSource):
+        return {}
     clip = load_clip(play, source)
     return {**clip.facts, "warnings": [*clip.camera.warnings(), *clip.warnings]}
 
@@ -254,7 +257,10 @@ def reconstruct(play: Play) -> Reconstruction:
     """
     if isinstance(play.source, WearableSource):
         return _from_wearable(play, play.source)
-    return _from_clicks(play, play.source)
+    if isinstance(play.source, ClicksSource):
+        return _from_clicks(play, play.source)
+    where = play.folder / "play.yaml"
+    raise InputError(where, "nothing was recorded", column="source", mend="name a source of tracks")
 
 
 def _from_clicks(play: Play, source: ClicksSource) -> Reconstruction:

@@ -4,7 +4,7 @@ Every setting has a description, a unit in its name and, where one is sensible, 
 schema of ``workflow/schemas/play.schema.json`` is generated from these models.
 """
 
-from replay.play.collision import Collision, GivenStart, Player, ReconstructedStart
+from replay.play.collision import ApparatusChoice, Collision, GivenStart, Player, ReconstructedStart
 from replay.play.controls import (
     BulkViscosity,
     Contact,
@@ -43,6 +43,7 @@ __all__ = [
     "AccelerationColumns",
     "AngularAccelerationColumns",
     "AngularVelocityColumns",
+    "ApparatusChoice",
     "AxisMap",
     "BulkViscosity",
     "ButterworthFilter",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -100,12 +100,33 @@ class Player(Setting):
     )
 
 
+class ApparatusChoice(Setting):
+    """A laboratory's apparatus in the striking player's place."""
+
+    name: Shipped = Field(
+        description="`linear_impactor`, a free ram with foam and cap; `drop_anvil`, on which the head falls.",
+        examples=["linear_impactor"],
+    )
+    place: Shipped = Field(
+        description="Where it meets the helmet: a place of its description, docs/collision.md.", examples=["side"]
+    )
+    speed_m_per_s: Positive = Field(
+        description="Closing speed: of the ram, or of the head that falls on the anvil [m/s].", examples=[7.4]
+    )
+
+
 class Collision(Setting):
     """Two players, the impactor with its initial velocities, the struck one unconstrained."""
 
-    impactor: Player = Field(
+    impactor: Player | None = Field(
+        default=None,
         description="Who strikes; protocol 3.6 gives the velocities to this player.",
         examples=[{"start": {"kind": "given", "velocity_m_per_s": [9.3, 0.0, 0.0]}}],
+    )
+    apparatus: ApparatusChoice | None = Field(
+        default=None,
+        description="What strikes in a laboratory, in place of an impactor.",
+        examples=[{"name": "linear_impactor", "place": "side", "speed_m_per_s": 7.4}],
     )
     struck: Player = Field(
         default_factory=lambda: Player(),
@@ -125,13 +146,36 @@ class Collision(Setting):
     pairs: tuple[FrictionPair, ...] = Field(
         default=(FrictionPair(first="helmet_1", second="helmet_2", friction=0.3),),
         description="Friction between the players, by pair of parts or part sets: helmet_1 is the struck "
-        "player's, helmet_2 the impactor's; 0.3 of painted polycarbonate is assumed.",
+        "player's, helmet_2 the impactor's, which is apparatus by default where one strikes; 0.3 of painted "
+        "polycarbonate is assumed.",
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _friction_with_what_strikes(cls, told: Any) -> Any:
+        if isinstance(told, dict) and told.get("apparatus") is not None and "pairs" not in told:
+            return {**told, "pairs": [{"first": "helmet_1", "second": "apparatus", "friction": 0.3}]}
+        return told
+
+    @model_validator(mode="after")
+    def _one_strikes(self) -> Collision:
+        if (self.impactor is None) == (self.apparatus is None):
+            refuse("not one strikes", "an `impactor`, or an `apparatus` of a laboratory", "keep one of the two blocks")
+        start = self.struck.start
+        if self.apparatus is not None and (start.kind != "given" or any(start.velocity_m_per_s)):
+            refuse(
+                "the struck player has a velocity of their own", "the apparatus's `speed_m_per_s` alone",
+                "leave the struck player's velocity out",
+            )  # fmt: skip
+        if self.apparatus is not None and self.tracked != "struck":
+            refuse("an apparatus has no head to be tracked", "`tracked: struck`", "leave `tracked` out")
+        return self
 
     @model_validator(mode="after")
     def _starts_are_known(self) -> Collision:
         for role in ("impactor", "struck"):
-            if getattr(self, role).start.kind == "reconstruction" and role != self.tracked:
+            player = self.player(role)
+            if player is not None and player.start.kind == "reconstruction" and role != self.tracked:
                 refuse(
                     f"the start of the {role} is to be reconstructed, but the tracks show the other player",
                     f"`tracked: {role}`, or a given start",
@@ -139,6 +183,12 @@ class Collision(Setting):
                 )
         return self
 
-    def player(self, role: str) -> Player:
-        """The ``struck`` player or the ``impactor``."""
+    def player(self, role: str) -> Player | None:
+        """The ``struck`` player or the ``impactor``; None where an apparatus strikes."""
         return self.struck if role == "struck" else self.impactor
+
+    @property
+    def given(self) -> bool:
+        """Whether both starts stand in the play, and none is reconstructed."""
+        players = (self.player(role) for role in ("impactor", "struck"))
+        return all(player.start.kind == "given" for player in players if player is not None)

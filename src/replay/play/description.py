@@ -27,6 +27,17 @@ class Window(Setting):
     )
 
 
+class NothingRecorded(Setting):
+    """No motion was recorded: a test in a laboratory of computers, or a question what would happen."""
+
+    kind: Literal["none"] = Field(default="none", description="Nothing was recorded; both starts are given.")
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Names of the files this source reads: none."""
+        return ()
+
+
 class ReconstructionChoice(Setting):
     """Which of the two reconstructions drives the replay; both are always made and shown."""
 
@@ -58,7 +69,7 @@ class Play(Setting):
     name: str = Field(description="Name of the play, that of its folder.", examples=["demo"])
     title: str = Field(default="", description="One sentence on the play.")
     struck_player: str = Field(default="not recorded", description="The player whose head is replayed.")
-    source: Annotated[ClicksSource | WearableSource, Field(discriminator="kind")] = Field(
+    source: Annotated[ClicksSource | WearableSource | NothingRecorded, Field(discriminator="kind")] = Field(
         description="Where the motion comes from.", examples=[{"kind": "clicks"}]
     )
     t0: Literal["angular", "linear"] = Field(
@@ -102,11 +113,21 @@ class Play(Setting):
     @model_validator(mode="after")
     def _a_wearable_has_no_posterior(self) -> Play:
         asked = self.reconstruction.mode == "posterior" or self.reconstruction.ensemble > 0
-        if self.source.kind == "wearable" and asked:
+        if self.source.kind != "clicks" and asked:
             refuse(
-                "reconstruction asks for the posterior of a wearable's record",
+                "reconstruction asks for the posterior of no clicks",
                 "clicks: a wearable is read as it is",
                 "remove the block `reconstruction`",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _without_a_record_starts_are_given(self) -> Play:
+        if not self.recorded and (self.collision is None or not self.collision.given):
+            refuse(
+                "nothing was recorded, and nothing says how the head moves",
+                "a block `collision` whose starts are given",
+                "name a source of tracks, or describe the collision",
             )
         return self
 
@@ -114,6 +135,11 @@ class Play(Setting):
     def mode(self) -> Literal["driver", "collision"]:
         """Whether one head is driven, or two players collide."""
         return "driver" if self.collision is None else "collision"
+
+    @property
+    def recorded(self) -> bool:
+        """Whether there is a record of the head's motion, to be reconstructed and compared with."""
+        return self.source.kind != "none"
 
     @property
     def folder(self) -> Path:

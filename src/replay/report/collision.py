@@ -18,8 +18,8 @@ def collision_figures(report: ReportInput, pictures: list[Picture]) -> str:
     """Return the picture of the scene (article, Figure 5) and the chart of the blow."""
     drawn = []
     if report.scene is not None:
-        alt = "Both helmeted heads at first contact, from outside, and the struck one cut open."
-        caption = "First contact: one millimetre is left between the players (article, Figure 5)."
+        alt = "The struck helmeted head and what strikes it at first contact, from outside and cut in half."
+        caption = "First contact: one millimetre is left between the two (article, Figure 5)."
         drawn.append(Picture("first_contact", "png", report.scene, alt, caption))
     if report.blow is not None:
         drawn.append(blow_chart(report.blow))

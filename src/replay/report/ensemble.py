@@ -14,11 +14,13 @@ _FIRST = (
     "peak_angular_acceleration",
     "peak_angular_velocity",
     "HIC15",
+    "SI",
     "BrIC",
     "brain mps_green_lagrange_p95",
     "action head",
     "blow peak_force_N",
     "facemask_mounts peak_force_N",
+    "compression, most of the helmet's pads",
 )
 _STYLE = """svg.band { display: block; width: 9rem; height: .9rem; }
 svg.band .whole { stroke: #8a9099; stroke-width: 1; } svg.band .middle { fill: #56B4E9; }

@@ -79,6 +79,8 @@ class ReportInput:
     stages
         One entry a stage: ``title``, ``state`` (``pass``, ``warn``, ``fail``, ``done`` or
         ``not run``) and ``detail``.
+    recorded
+        Whether the head's motion was recorded; without a record `kinematics` is the motion in the model.
     t0_s, window_s
         The impact reference and the analysis window (start, end), on the clock of `kinematics`.
     kinematics
@@ -127,7 +129,7 @@ class ReportInput:
     mesh, snapshots, damage_snapshots
         For the pictures of the model, of the strain and of the damage variable.
     published
-        Values of a collision by the keys of ``published.yaml``; None of a driven head.
+        Values of a collision by the keys of ``published.yaml``; None of a driven head and of a laboratory's test.
     blow
         blow_force.csv: the impactor's force on the struck player; None of a driven head.
     pads
@@ -147,6 +149,7 @@ class ReportInput:
     gates: Sequence[Row]
     gate_facts: Mapping[str, Row]
     stages: Sequence[Row] = ()
+    recorded: bool = True
     t0_s: float | None = None
     window_s: tuple[float, float] | None = None
     kinematics: pd.DataFrame | None = None

@@ -44,11 +44,17 @@ def write_report(folder: str | Path, report: ReportInput) -> Path:
     return folder / "report.html"
 
 
+def _fidelity(report: ReportInput, pictures: list[Picture]) -> list[tuple[str, str, str]]:
+    """Return the section that only a recorded motion has."""
+    return [("driver", "Driver fidelity", sections.driver_section(report, pictures))] if report.recorded else []
+
+
 def _collision(report: ReportInput, pictures: list[Picture]) -> list[tuple[str, str, str]]:
     """Return the section that only two players have."""
-    if report.published is None:
+    if report.scene is None:
         return []
-    content = collision_figures(report, pictures) + published_section(report.published) + pads_table(report)
+    published = "" if report.published is None else published_section(report.published)
+    content = collision_figures(report, pictures) + published + pads_table(report)
     return [("collision", "The collision", content)]
 
 
@@ -56,7 +62,7 @@ def _page(report: ReportInput, pictures: list[Picture]) -> str:
     parts = [
         ("play", "The play", sections.play_section(report)),
         ("gates", "Gates", gates_section(report)),
-        ("driver", "Driver fidelity", sections.driver_section(report, pictures)),
+        *_fidelity(report, pictures),
         *_collision(report, pictures),
         ("motion", "Head motion", sections.motion_section(report, pictures)),
         ("numerics", "Solver", sections.numerics_section(report, pictures)),

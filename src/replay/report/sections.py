@@ -78,7 +78,7 @@ def driver_section(report: ReportInput, pictures: list[Picture]) -> str:
             "<p>The skull in the model is driven. What is left between the driver and the motion that was made is"
             f" at most {position} mm and {rotation} degrees.</p>"
         )
-        if report.published is not None:
+        if report.scene is not None:
             words = (
                 "<p>The head in the model is free: nothing tells it the reconstructed motion, which is the target"
                 f" here. Over the window the two part by up to {position} mm and {rotation} degrees.</p>"

@@ -32,9 +32,9 @@ def run(workspace: Workspace) -> str | None:
         stage.read("inputs", file)
     model, judged = _player(stage, play, "struck")
     if play.collision is not None:
-        impactor, also = _player(stage, play, "impactor")
-        models.write_model(stage.write("impactor.h5", "the striking player"), impactor)
-        judged = [_both(*pair) for pair in zip(judged, also)]
+        impactor, also = _striker(stage, play)
+        models.write_model(stage.write("impactor.h5", "the striking player, or a laboratory's apparatus"), impactor)
+        judged = [_both(gate, also.get(gate.name)) for gate in judged]
     models.write_model(stage.write("model.h5", "nodes, hexes, parts, sets, materials"), model)
     models.write_parts_table(stage.write("parts.csv", "parts with material, volume, mass and quality"), model)
     models.write_preview(stage.write("preview.png", "the model from outside and cut in half"), model)
@@ -45,6 +45,22 @@ def run(workspace: Workspace) -> str | None:
     judged[0].write(stage.write("gate_helmet.json", "gate: helmet readiness"))
     judged[1].write(stage.write("gate.json", "gate: assembly"))
     return stage.finish(judged, parameters=dict(model.info))
+
+
+def _striker(stage: Stage, play: Play) -> tuple[Model, dict[str, gates.Gate]]:
+    """The impactor's model and the gates on it by name: an apparatus has no helmet to be judged."""
+    assert play.collision is not None
+    if play.collision.apparatus is None:
+        model, judged = _player(stage, play, "impactor")
+        return model, {gate.name: gate for gate in judged}
+    model = models.build_apparatus(play.collision.apparatus.name, play.model.resolution)
+    facts = models.apparatus_inspection(model)
+    print(models.summary_text(model))
+    write_json(
+        stage.write("impactor_inspection.json", "what the assembly gate was told of the apparatus"), {"assembly": facts}
+    )
+    gate = gates.assembly_gate(told(facts, ASSEMBLY_CHECKS), limits_of(stage))
+    return model, {gate.name: gate}
 
 
 def _player(stage: Stage, play: Play, role: str) -> tuple[Model, list[gates.Gate]]:
@@ -86,8 +102,10 @@ def _player(stage: Stage, play: Play, role: str) -> tuple[Model, list[gates.Gate
     return (model if role == "struck" else models.second_player(model)), judged
 
 
-def _both(struck: gates.Gate, impactor: gates.Gate) -> gates.Gate:
+def _both(struck: gates.Gate, impactor: gates.Gate | None) -> gates.Gate:
     """One gate of both players' checks."""
+    if impactor is None:
+        return struck
     also = (dataclasses.replace(check, name=f"{check.name}: impactor") for check in impactor.checks)
     return dataclasses.replace(struck, checks=(*struck.checks, *also))
 

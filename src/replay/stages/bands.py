@@ -134,6 +134,10 @@ def measures_in(document: dict[str, Any]) -> dict[str, tuple[float, str]]:
     action = {name: document["action"].get(name) for name in ("head", "helmet", "impactor")}
     found |= {f"action {name}": (value, "J s") for name, value in action.items()}
     found["action crossover_time_s"] = (document["action"]["crossover_time_s"], "s")
+    pads = {pad["part"]: pad["compression_mean"] for pad in document.get("pads", ())}
+    worn = [value for part, value in pads.items() if "_pad_" in part and not part.endswith("_2")]
+    found["compression, most of the helmet's pads"] = (max(worn, default=None), "1")
+    found |= {f"compression {part}": (value, "1") for part, value in pads.items()}
     return {
         name: (float(value), unit)
         for name, (value, unit) in found.items()

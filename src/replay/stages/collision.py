@@ -8,9 +8,9 @@ import numpy as np
 
 from replay.models import Model
 from replay.play import Play
-from replay.solver import ContactControls, ContactPair, Controls, Problem
+from replay.solver import ContactControls, ContactPair, Controls, PrescribedMotion, Problem
 from replay.stages.contact import contact_controls, part_numbers
-from replay.stages.players import ROLES, PlayerStart, scene_velocities
+from replay.stages.players import ROLES, PlayerStart, held_part, scene_velocities
 from replay.stages.problem import (
     body_links,
     chin_straps,
@@ -54,6 +54,7 @@ def _problem(scene: Model, velocities: np.ndarray, controls: Controls, play: Pla
         parts=solver_parts(scene),
         controls=controls,
         initial_velocity=velocities,
+        prescribed=_held(scene, controls),
         node_ids=scene.node_ids,
         element_ids=scene.element_ids,
         rigid_sets=(*sum(shells, ()), *bodies),
@@ -63,15 +64,26 @@ def _problem(scene: Model, velocities: np.ndarray, controls: Controls, play: Pla
     )
 
 
+def _held(scene: Model, controls: Controls) -> tuple[PrescribedMotion, ...]:
+    """The motion of what is held: none at all."""
+    part = held_part(scene)
+    if part is None:
+        return ()
+    still = np.zeros((2, 3))
+    times = np.array([0.0, controls.termination_time_s])
+    return (PrescribedMotion((part.pid,), times, still, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)), still, still),)
+
+
 def contact_of_players(scene: Model, play: Play) -> ContactControls:
     """Contact between the players; within a player only where the helmet is seated by contact.
 
-    Where pads share nodes with scalp and shell, faces that meet in a gap between two pads are no pair of bodies.
+    Where pads share nodes with scalp and shell, faces that meet in a gap between two pads are no pair of bodies; nor
+    are the layers of an apparatus.
     """
     assert play.collision is not None
     apart: list[ContactPair] = []
-    if not seated_by_contact(scene):
-        for role, number in ROLES.items():
+    for role, number in ROLES.items():
+        if not seated_by_contact(scene) or (role == "impactor" and play.collision.apparatus is not None):
             own = tuple(part.pid for part in scene.parts if part.player == number)
             apart.append(ContactPair(own, own, active=False, name=f"within the {role} player"))
     between = [

@@ -14,7 +14,7 @@ from replay.motion import Kinematics
 from replay.play import Play, estimate
 from replay.stages.frame import Stage, Workspace
 from replay.stages.own_deck import model_facts, node_sets, region_sets
-from replay.stages.players import PLAYER_SETS
+from replay.stages.players import PLAYER_SETS, held_part
 from replay.stages.problem import chin_straps, seated_by_contact
 from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
@@ -92,9 +92,11 @@ def collision_deck(play: Play, scene: Model, placement: dict[str, Any]) -> decks
         for name in (name for name in names if name in scene.part_sets):
             number = scene.part_set_ids[name]
             velocities.append(decks.InitialVelocity(number, velocity, start["omega_rad_per_s"], p, q))
+    held, still = held_part(scene), np.zeros((2, 3))
     return decks.DeckInput(
         **_common(play, scene),
         nodes=scene.nodes,
+        driver=decks.Driver(held.pid, np.array([0.0, play.window.duration_s]), still, still) if held else None,
         initial_velocities=tuple(velocities),
         contact=True,
         facts=model_facts(scene, np.zeros(3), Rotation.identity()),

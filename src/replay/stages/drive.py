@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from replay.files import read_json, write_json
 from replay.motion import Kinematics, build_driver
+from replay.play import Play
 from replay.stages.frame import Stage, Workspace
 from replay.stages.players import ROLES, start_of
 from replay.stages.resolved import read_settings
@@ -17,6 +18,10 @@ def run(workspace: Workspace) -> str | None:
     if stage.stopped_by:
         return stage.skip()
     play = read_settings(stage)
+    if not play.recorded:
+        _write_starts(stage, play, None, 0.0)
+        print("driver: nothing was recorded; both starts are given")
+        return stage.finish()
     chosen = play.reconstruction
     source = "kinematics.csv" if chosen.mode == "protocol" else "posterior_motion.csv"
     motion = Kinematics.read(stage.read("reconstruction", source))
@@ -36,12 +41,16 @@ def run(workspace: Workspace) -> str | None:
             }
         )
     )
-    if play.collision is not None:
-        starts = {role: start_of(play.collision, role, motion, driver.start_s).to_json() for role in ROLES}
-        write_json(stage.write("starts.json", "posture and velocities of both players at first contact"), starts)
+    _write_starts(stage, play, motion, driver.start_s)
     quality = driver.quality
     print(
         f"driver: {play.window.duration_s * 1e3:g} ms from {driver.start_s:.4f} s; overshoot of acceleration "
         f"{quality.overshoot_acceleration_percent:.3g} %, of omega {quality.overshoot_omega_percent:.3g} %"
     )
     return stage.finish()
+
+
+def _write_starts(stage: Stage, play: Play, motion: Kinematics | None, start_s: float) -> None:
+    if play.collision is not None:
+        starts = {role: start_of(play.collision, role, motion, start_s).to_json() for role in ROLES}
+        write_json(stage.write("starts.json", "posture and velocities of both players at first contact"), starts)

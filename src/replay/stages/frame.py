@@ -273,10 +273,14 @@ COMMANDS = {
 STAGES = tuple(COMMANDS)
 """Every stage with a manifest, in the order of the protocol."""
 _OF_COLLISIONS = ("placement",)
+_OF_RECORDS = ("reconstruction", "fidelity")
 
 
 def stages_of(workspace: Workspace) -> tuple[str, ...]:
     """The stages that a play of this mode has, by its resolved settings."""
     settings = workspace.folder("settings") / "play.json"
-    collides = settings.is_file() and read_json(settings).get("collision") is not None
-    return tuple(stage for stage in STAGES if collides or stage not in _OF_COLLISIONS)
+    play = read_json(settings) if settings.is_file() else {}
+    absent = set() if play.get("collision") else set(_OF_COLLISIONS)
+    if play.get("source", {}).get("kind") == "none":
+        absent |= set(_OF_RECORDS)
+    return tuple(stage for stage in STAGES if stage not in absent)

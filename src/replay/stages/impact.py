@@ -17,6 +17,7 @@ from replay.stages.collision import collision_problem
 from replay.stages.contact import contact_numbers
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
+from replay.stages.players import held_part
 from replay.stages.problem import controls_of, driven_problem
 from replay.stages.replayed import replayed_model
 from replay.stages.resolved import read_settings
@@ -119,8 +120,8 @@ def brain_recorder(model: Model) -> BrainRecorder:
 
 
 def pad_recorder(model: Model) -> PadRecorder:
-    """Recorder of all pads and chin cups."""
-    roles = ("comfort_pad", "energy_pad", "chin_cup")
+    """Recorder of all pads and chin cups, and of the foam of an apparatus."""
+    roles = ("comfort_pad", "energy_pad", "chin_cup", "cushion")
     pads = {p.name: np.flatnonzero(model.element_part == k) for k, p in enumerate(model.parts) if p.role in roles}
     return PadRecorder(pads)
 
@@ -152,7 +153,7 @@ def judge_numerics(stage: Stage) -> Gate:
         {"ran_to_end": summary["ran_to_end"], **run_numbers(summary)},
         limits_of(stage),
         steps=steps["step"].to_numpy(),
-        free=read_settings(stage).mode == "collision",
+        free=read_settings(stage).mode == "collision" and held_part(model) is None,
         contact=contact_numbers(summary, energy),
     )
 

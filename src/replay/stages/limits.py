@@ -21,7 +21,7 @@ def limits_of(stage: Finished) -> Limits:
         "assembly.helmet_cg_difference_m": play.helmet.cg_tolerance_m,
         "helmet.cg_offset_m": play.helmet.cg_tolerance_m,
     }
-    return Limits.load({**tolerances, **play.gates}, mode=play.mode)
+    return Limits.load({**tolerances, **play.gates}, mode=play.mode, recorded=play.recorded)
 
 
 def told(facts: Mapping[str, Any], checks: tuple[str, ...]) -> dict[str, Any]:

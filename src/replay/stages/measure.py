@@ -29,7 +29,7 @@ from replay.stages.limits import limits_of
 from replay.stages.replayed import replayed_model
 
 _DRIVEN = "a driven head has no impactor: the crossover is that of head and helmet"
-_COLLISION = "the impactor is all of the striking player; the crossover is that of the struck head and the impactor"
+_COLLISION = "the impactor is all of what strikes; the crossover is that of the struck head and the impactor"
 
 
 def run(workspace: Workspace) -> str | None:

@@ -20,7 +20,7 @@ from replay.stages.collision import scene_at_rest
 from replay.stages.contact import pairs_without_a_side
 from replay.stages.frame import Stage, Workspace
 from replay.stages.limits import limits_of
-from replay.stages.players import ROLES, PlayerStart
+from replay.stages.players import ROLES, PlayerStart, aim_of
 from replay.stages.problem import controls_of
 from replay.stages.replayed import SCENE
 from replay.stages.resolved import read_settings
@@ -95,7 +95,7 @@ def place(
         )  # fmt: skip
     direction = closing / speed
     struck = _stand(models["struck"], np.zeros(3), starts["struck"])
-    aim = starts["struck"].rotation.apply(collision.aim_m)
+    aim = starts["struck"].rotation.apply(aim_of(collision))
     turned = _stand(models["impactor"], aim, starts["impactor"])
     back = _reach(struck.nodes, -direction) - _reach(turned.nodes, -direction)
     back = max(0.0, back + _reach(turned.nodes, direction) + _reach(turned.nodes, -direction)) + collision.gap_m
@@ -107,6 +107,14 @@ def place(
     info = {name: fact for name, fact in struck.info.items() if name != "player"}
     scene = dataclasses.replace(scene, info={**info, **scene.info})
     return scene, found, {"struck": np.zeros(3), "impactor": centre}
+
+
+def _name(collision: Collision, role: str) -> str:
+    if role == "impactor" and collision.apparatus is not None:
+        return collision.apparatus.name
+    player = collision.player(role)
+    assert player is not None
+    return player.name
 
 
 def _stand(model: Model, centre: np.ndarray, start: PlayerStart) -> Model:
@@ -143,7 +151,7 @@ def _report(
         },
         "players": {
             role: {
-                "name": collision.player(role).name,
+                "name": _name(collision, role),
                 "head_cg_m": places[role].tolist(),
                 **starts[role].to_json(),
                 "P_global_m": (places[role] + starts[role].rotation.apply(starts[role].p_m)).tolist(),

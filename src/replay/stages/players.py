@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from replay.models import Model
+from replay.models import Model, Part, load_apparatus
 from replay.motion import Kinematics, steady_before
 from replay.play import Collision, GivenStart
 from replay.solver import initial_velocity_about_axis
 
 ROLES = {"struck": 1, "impactor": 2}
 """The two players of a collision, and the number of each."""
-PLAYER_SETS = {"struck": ("head_1", "helmet_1", "body_1"), "impactor": ("head_2", "helmet_2", "body_2")}
+PLAYER_SETS = {"struck": ("head_1", "helmet_1", "body_1"), "impactor": ("head_2", "helmet_2", "body_2", "apparatus")}
 """Sets that together hold all parts of a player: a deck's set is a range of numbers, and no range holds a player."""
 
 
@@ -73,7 +73,7 @@ class PlayerStart:
         )
 
 
-def start_of(collision: Collision, role: str, kinematics: Kinematics, window_start_s: float) -> PlayerStart:
+def start_of(collision: Collision, role: str, kinematics: Kinematics | None, window_start_s: float) -> PlayerStart:
     """Start of one player.
 
     Parameters
@@ -83,24 +83,69 @@ def start_of(collision: Collision, role: str, kinematics: Kinematics, window_sta
     role
         One of `ROLES`.
     kinematics
-        Reconstruction of the tracked head.
+        Reconstruction of the tracked head; None where nothing was recorded.
     window_start_s
         Time of first contact on its clock [s].
     """
-    start = collision.player(role).start
+    player = collision.player(role)
+    if player is None:
+        return _apparatus_start(collision)
+    start = player.start
     if isinstance(start, GivenStart):
-        return PlayerStart(
+        told = PlayerStart(
             Rotation.from_quat(start.orientation),
             np.array(start.velocity_m_per_s, float),
             float(start.omega_rad_per_s),
             np.array(start.p_m, float),
             np.array(start.q_m, float),
         )
+        falls = collision.apparatus is not None and load_apparatus(collision.apparatus.name).held == "fixed"
+        return replace(told, velocity_m_per_s=-_approach(collision)) if falls else told
+    assert kinematics is not None
     before = steady_before(kinematics, window_start_s, start.fit_s)
     rotation, velocity, omega = before.rotation[0], before.velocity_m_per_s[0], before.omega_rad_per_s[0]
     speed = float(np.sqrt(omega @ omega))
     axis = rotation.inv().apply(omega / speed) if speed > 0 else np.array([0.0, 0.0, 1.0])
     return PlayerStart(rotation, velocity, speed, np.zeros(3), axis)
+
+
+def _apparatus_start(collision: Collision) -> PlayerStart:
+    """Start of an apparatus, whose tip and axis x stand for a player's head: it moves unless it is held."""
+    assert collision.apparatus is not None
+    design = load_apparatus(collision.apparatus.name)
+    velocity = np.zeros(3) if design.held == "fixed" else _approach(collision)
+    return PlayerStart(_apparatus_rotation(collision), velocity, 0.0, np.zeros(3), np.array([1.0, 0.0, 0.0]))
+
+
+def _apparatus_rotation(collision: Collision) -> Rotation:
+    """Axes of the apparatus to global ones: its place is said in the axes of the struck head."""
+    assert collision.apparatus is not None
+    place = load_apparatus(collision.apparatus.name).place(collision.apparatus.place)
+    start = collision.struck.start
+    assert isinstance(start, GivenStart)
+    return Rotation.from_quat(start.orientation) * place.rotation
+
+
+def _approach(collision: Collision) -> np.ndarray:
+    """Velocity of the apparatus as seen from the struck head, (3,) [m/s]."""
+    assert collision.apparatus is not None
+    return collision.apparatus.speed_m_per_s * _apparatus_rotation(collision).apply([1.0, 0.0, 0.0])
+
+
+def aim_of(collision: Collision) -> np.ndarray:
+    """Point through which what strikes would pass, from the struck head's CG in its axes, (3,) [m]."""
+    aim = np.array(collision.aim_m, float)
+    if collision.apparatus is None:
+        return aim
+    return aim + np.array(load_apparatus(collision.apparatus.name).place(collision.apparatus.place).aim_m)
+
+
+def held_part(scene: Model) -> Part | None:
+    """The rigid part by which an apparatus is held in place; None where everything is free."""
+    facts = scene.info.get("players", [{}])[-1].get("apparatus")
+    if facts is None or facts["held"] != "fixed":
+        return None
+    return next(part for part in scene.parts if part.role == "mount")
 
 
 def scene_velocities(

@@ -79,7 +79,7 @@ def chin_straps(model: Model, player: int = 1) -> tuple[tuple[RigidSet, ...], tu
     ending = "" if player == 1 else f"_{player}"
     sets = {name: rows for name, rows in model.node_sets.items() if ending or not name.endswith("_2")}
     sets = {name.removesuffix(ending): rows for name, rows in sets.items() if name.endswith(ending)}
-    data = model.info["players"][player - 1]["strap"] if "players" in model.info else model.info["strap"]
+    data = (model.info["players"][player - 1] if "players" in model.info else model.info).get("strap", {})
     straps = []
     for name in sorted(sets):
         place = name.removeprefix("strap_anchor_")

@@ -38,6 +38,7 @@ _TITLES = {
     "fidelity": "Driver fidelity",
     "measures": "Measures",
 }
+_SOURCES = {"clicks": "clicked video", "wearable": "wearable", "none": "nothing recorded, starts given"}
 _DRIVEN = (
     "The blow itself. The skull is rigid and driven along the reconstructed motion; nothing strikes the helmet,"
     " and facemask forces, contact work and the action of an impactor are not computed."
@@ -45,6 +46,10 @@ _DRIVEN = (
 _NO_BODY = (
     "The rest of the players. Two helmeted heads collide without necks and bodies, so that what follows the first"
     " milliseconds lacks the mass and the restraint that a neck would bring."
+)
+_FREE_HEAD = (
+    "The neck and the carriage of the laboratory. The helmeted head is free, so that what follows the first"
+    " milliseconds lacks the mass and the restraint that they would bring; no gravity acts."
 )
 _BODY = (
     "Muscles. Necks and bodies are passive: joints with springs of an assumed stiffness, and no muscle that is braced"
@@ -100,7 +105,8 @@ def collect(stage: Stage) -> ReportInput:
     play = read_settings(stage)
     limits = limits_of(stage)
     inputs = read_json(stage.read("inputs", "inputs.json"))
-    quality = read_json(stage.read("reconstruction", "quality.json"))
+    quality = read_json(stage.read("reconstruction", "quality.json")) if play.recorded else {}
+    clicked = quality.get("kind") == "clicks"
     model = read_model(stage.read("assembly", "model.h5"))
     known: dict[str, Any] = {
         "play": _play_facts(play, quality, model.info["helmet"]["chosen"]),
@@ -111,10 +117,11 @@ def collect(stage: Stage) -> ReportInput:
             for name, facts in limits.protocol.items()
         },
         "stages": _stages(stage),
-        "t0_s": quality["driving_t0_s"],
-        "kinematics": _table(stage, "reconstruction", "kinematics.csv"),
-        "peaks": _table(stage, "reconstruction", "peaks.csv") if quality["kind"] == "clicks" else None,
-        "quality": _table_two(stage, limits) if quality["kind"] == "clicks" else (),
+        "recorded": play.recorded,
+        "t0_s": quality.get("driving_t0_s"),
+        "kinematics": _table(stage, "reconstruction", "kinematics.csv") if play.recorded else None,
+        "peaks": _table(stage, "reconstruction", "peaks.csv") if clicked else None,
+        "quality": _table_two(stage, limits) if clicked else (),
         "parts": _parts(stage, model),
         "parameters": _parameters(model),
         "mesh": _mesh(model),
@@ -124,7 +131,7 @@ def collect(stage: Stage) -> ReportInput:
             _BRAIN[play.model.brain_material],
             _MEMBRANES[play.model.membranes],
             _STRUCTURE[play.model.helmet_structure],
-            *quality["warnings"],
+            *quality.get("warnings", ()),
         ],
         "inputs": inputs["files"],
         "provenance": _provenance(stage, model),
@@ -134,8 +141,10 @@ def collect(stage: Stage) -> ReportInput:
         start = read_json(stage.read("driver", "initial_velocity.json"))["time_s"]
         known["driver"] = _table(stage, "driver", "driver_6dof.csv")
         known["window_s"] = (start, start + play.window.duration_s)
-    if stage.made("fidelity", "fidelity.json"):
+    if stage.made("measures", "measures.json"):
         known |= _replayed(stage, play, model)
+    if not play.recorded and stage.made("measures", "head_motion.csv"):
+        known["kinematics"] = _table(stage, "measures", "head_motion.csv")
     return ReportInput(**known)
 
 
@@ -150,7 +159,7 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
     damaged = stage.made("measures", "damage_volume.csv")
     return {
         "applied": _columns(applied),
-        "fidelity": read_json(stage.read("fidelity", "fidelity.json")),
+        "fidelity": read_json(stage.read("fidelity", "fidelity.json")) if play.recorded else None,
         "initial_conditions": _initial_conditions(stage, applied),
         "energy": _table(stage, "replay", "energy.csv"),
         "timestep": _table(stage, "replay", "timestep.csv").query("step > 0"),
@@ -166,20 +175,24 @@ def _replayed(stage: Stage, play: Play, model: Model) -> dict[str, Any]:
         "snapshots": _snapshots(stage, model),
         "damage_snapshots": _damage_snapshots(stage, model) if damaged else None,
         "pads": measures["pads"],
-        **_collided(stage, measures),
+        **_collided(stage, play, measures),
     }
 
 
-def _collided(stage: Stage, measures: dict[str, Any]) -> dict[str, Any]:
+def _collided(stage: Stage, play: Play, measures: dict[str, Any]) -> dict[str, Any]:
     """What only two players have: how they met, the force between them, and published numbers beside theirs."""
-    if not stage.made("placement", "placement.json"):
+    if play.collision is None:
         return {}
+    met = {
+        "scene": stage.read("placement", "preview.png").read_bytes(),
+        "blow": _table(stage, "measures", "blow_force.csv") if stage.made("measures", "blow_force.csv") else None,
+    }
+    if play.collision.apparatus is not None:
+        return met
     head = {entry["name"]: entry["value"] for entry in measures["head"]}
     masses = read_json(stage.read("assembly", "mass_properties.json"))["assemblies"]
     damage = measures["damage"]
-    return {
-        "scene": stage.read("placement", "preview.png").read_bytes(),
-        "blow": _table(stage, "measures", "blow_force.csv") if stage.made("measures", "blow_force.csv") else None,
+    return met | {
         "published": {
             "closing_speed_m_per_s": read_json(stage.read("placement", "placement.json"))["closing_speed_m_per_s"],
             **dict.fromkeys(NAMES),
@@ -201,20 +214,30 @@ def _blow(play: Play) -> list[str]:
     """What the way in which the head is struck cannot show."""
     if play.collision is None:
         return [_DRIVEN]
-    bodies = [play.collision.player(role).body for role in ROLES]
+    players = [player for role in ROLES if (player := play.collision.player(role)) is not None]
+    bodies = [player.body for player in players]
+    if len(players) < len(ROLES):
+        return [_BODY if all(bodies) else _FREE_HEAD]
     return [_BODY] * any(bodies) + [_NO_BODY] * (not all(bodies))
 
 
 def _play_facts(play: Play, quality: dict[str, Any], worn: Mapping[str, str]) -> dict[str, Any]:
+    recorded = {}
+    if play.recorded:
+        recorded = {
+            "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
+            "t0": f"{1e3 * quality['driving_t0_s']:.1f} ms (peak {play.t0} acceleration)",
+        }
+    length = f"{1e3 * play.window.duration_s:g} ms"
+    start = f"{1e3 * play.window.before_t0_s:g} ms before t0" if recorded else "first contact"
     weight = "not weighed" if play.helmet.mass_kg is None else f"{play.helmet.mass_kg:g} kg"
     return {
         "name": play.name,
         "title": play.title,
         "struck player": play.struck_player,
-        "source": "clicked video" if play.source.kind == "clicks" else "wearable",
-        "sampling": f"{quality['rate_hz']:g} Hz, {quality['samples']} samples",
-        "t0": f"{1e3 * quality['driving_t0_s']:.1f} ms (peak {play.t0} acceleration)",
-        "window": f"{1e3 * play.window.duration_s:g} ms from {1e3 * play.window.before_t0_s:g} ms before t0",
+        "source": _SOURCES[play.source.kind],
+        **recorded,
+        "window": f"{length} from {start}",
         "helmet": f"{play.helmet.model}, {weight}",
         "finite-element helmet": ", ".join(f"{name} {value}" for name, value in worn.items()),
         "model": f"{play.model.preset}, {play.model.resolution}",
@@ -273,7 +296,9 @@ def _table_two(stage: Stage, limits: Limits) -> list[dict[str, Any]]:
 
 def _initial_conditions(stage: Stage, applied: Motion) -> list[dict[str, Any]]:
     """The article's Table 3: what was reconstructed at the start of the window, and what the model started with."""
-    told = read_json(stage.read("driver", "initial_velocity.json"))
+    told = {}
+    if stage.made("driver", "initial_velocity.json"):
+        told = read_json(stage.read("driver", "initial_velocity.json"))
     if stage.made("placement", "placement.json"):
         return _two_starts(stage, told)
     return [
@@ -296,7 +321,7 @@ def _two_starts(stage: Stage, told: dict[str, Any]) -> list[dict[str, Any]]:
     players = read_json(stage.read("placement", "placement.json"))["players"]
     rows = []
     for role, start in players.items():
-        seen = collision is not None and role == collision.tracked
+        seen = bool(told) and collision is not None and role == collision.tracked
         axis = np.array(start["Q_global_m"]) - np.array(start["P_global_m"])
         omega = start["omega_rad_per_s"] * axis / np.sqrt(axis @ axis)
         for item, unit, key, applied in (

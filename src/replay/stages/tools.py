@@ -52,8 +52,9 @@ def show_verdict(results: Path) -> int:
     if not path.is_file():
         raise InputError(path, "there is no verdict here", mend=f"run `make run PLAY={results.name}` first")
     verdict = read_json(path)
-    collision = read_json(results / "settings" / "play.json").get("collision")
-    limits = Limits.load(mode="collision" if collision else "driver")
+    play = read_json(results / "settings" / "play.json")
+    recorded = play.get("source", {}).get("kind") != "none"
+    limits = Limits.load(mode="collision" if play.get("collision") else "driver", recorded=recorded)
     found: dict[str, Gate] = {}
     for stage, files in ALL_GATE_FILES.items():
         for file in files:
@@ -179,6 +180,7 @@ def write_model_file(
     out: Path,
     preview: Path | None,
     body: dict[str, Any] | None = None,
+    apparatus: str | None = None,
 ) -> int:
     """Build a model by itself, print its tables and write it.
 
@@ -192,7 +194,16 @@ def write_model_file(
         Files to write.
     body
         ``posture``, and fields of `replay.models.BodyPlan`; none for a head and helmet alone.
+    apparatus
+        Name of a laboratory's apparatus, to be built in place of them.
     """
+    if apparatus is not None:
+        model = models.build_apparatus(apparatus, resolution)
+        models.write_model(out, model)
+        print(models.summary_text(model))
+        if preview is not None:
+            models.write_preview(preview, model)
+        return 0
     helmet, *others = pieces
     model = models.build_model(preset, resolution, design=models.load_design(helmet or "classic", *others))
     if body is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from replay.bundle import package_facts
 from replay.files import write_json
 from replay.gates import Gate, PlayVerdict, package_gate, play_verdict, read_gate
-from replay.gates.package import VIDEO_PACKAGE, WEARABLE_PACKAGE
+from replay.gates.package import UNRECORDED_PACKAGE, VIDEO_PACKAGE, WEARABLE_PACKAGE
 from replay.stages.frame import STAGES, Stage, Workspace
 from replay.stages.limits import limits_of
 from replay.stages.resolved import read_settings
@@ -41,7 +41,7 @@ def package(stage: Stage) -> Gate:
     root = Path(__file__).resolve().parents[3]
     facts = package_facts(stage.workspace.results / stage.workspace.play, root)
     kind = read_settings(stage).source.kind
-    required = VIDEO_PACKAGE if kind == "clicks" else WEARABLE_PACKAGE
+    required = {"clicks": VIDEO_PACKAGE, "wearable": WEARABLE_PACKAGE, "none": UNRECORDED_PACKAGE}[kind]
     return package_gate(facts, limits_of(stage), required=required)
 
 
