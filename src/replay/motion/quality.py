@@ -197,8 +197,9 @@ def video_quality(
         ("a_m_per_s2", "linear acceleration", "m/s^2"),
     ):
         if peaks[name] < 2.0 * nulls[name]:
-            peak, null = f"{peaks[name]:.4g} {unit}", f"{nulls[name]:.4g}"
-            warnings.append(f"peak {label} {peak} is not told from noise (a head without impact shows {null})")
+            noise = f"{nulls[name]:.4g}"
+            shown = f"{peaks[name]:.4g} {unit}"
+            warnings.append(f"peak {label} {shown} is not told from noise (a head without impact shows {noise})")
     if not measured:
         warnings.append(f"click noise is taken from the camera file ({sigma:g} px): residuals cannot tell it")
     return ReconstructionQuality(
