@@ -64,23 +64,6 @@ def test_flat_faces_matching_or_shifted(count: int, shift: float) -> None:
     assert energy.kinetic + energy.internal < energy.initial
 
 
-@pytest.mark.parametrize("turn", [0.0, 0.5])
-@pytest.mark.parametrize(("shift", "most"), [(0.0, 9), (0.003, 8)])
-def test_nodes_that_meet_node_on_node_hold_each_other_once(turn: float, shift: float, most: int) -> None:
-    # nine pairs, or, out of line, the four nodes of each face that lie over the other
-    blocks = [
-        Block((2, 2, 2), (0.02, 0.02, 0.02), (shift, shift, 0.0101), SOFT, (0, 0, -5.0), turn_deg=(turn, 0, 0)),
-        Block((2, 2, 2), (0.02, 0.02, 0.02), (0, 0, -0.01), SOFT),
-    ]
-    march = Steps(scene(blocks, ContactControls(points="corners")))
-    counts = []
-    while march.run.time_s < 2e-4:
-        march.step()
-        assert march.run.contact is not None
-        counts.append(march.run.contact.n_constraints)
-    assert max(counts) == most
-
-
 def test_peak_internal_energy_does_not_depend_on_whether_nodes_match() -> None:
     peaks = []
     for count in (4, 5):
@@ -172,7 +155,7 @@ def test_fast_block_that_moves_up_to_half_a_face_in_a_step(
     march = bounce(
         Block((3, 3, 3), (0.03, 0.03, 0.03), (-0.05, 0, 0.0152), material, velocity, turn_deg=(0, 0, 30)),
         Block((12, 4, 2), (0.2, 0.06, 0.02), (0, 0, -0.01), elastic(1e8, 0.3, 5000.0)), 1.2e-3, friction=0.1,
-        deepest=0.08 if material.is_rigid else 0.05,
+        deepest=0.05 if material is SOFT else 0.08,
     )  # fmt: skip
     assert march.run.dt_s * velocity[0] > 0.15 * 0.2 / 12
 

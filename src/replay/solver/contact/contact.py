@@ -20,7 +20,6 @@ from replay.solver.kernels import contact_work as work
 from replay.solver.kernels.contact_detect import SLOTS, detect
 from replay.solver.kernels.contact_solve import solve
 from replay.solver.kernels.contact_system import CORNERS, Carriers, Constraints, Nodes, assemble, carry, weigh
-from replay.solver.kernels.contact_thinning import thin
 from replay.solver.kernels.lanes import VELOCITY
 from replay.solver.rigid import Bodies
 
@@ -171,7 +170,6 @@ class Contact:
             nodal, self._mesh, self._search.points, self._search.first, self._search.candidates, reach, dt,
             _NEAR_SHARE, self._old_face, self._depth, self._hits, self._slots,
         )  # fmt: skip
-        thin(self._mesh, self._surface_row, self._slots)
         n, deepest = work.survey(self._slots)
         self.counts[3] = max(self.counts[3], deepest)
         if n > self._room:
