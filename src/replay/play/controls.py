@@ -43,7 +43,8 @@ class ContactSettings(Setting):
         description="Lagrange multipliers on velocities (the article's scheme 3, constraint type 0).",
     )
     most_iterations: Annotated[int, Field(ge=1, le=1000)] = Field(
-        default=20, description="Iterations of the multipliers in a step, at most."
+        default=200,
+        description="Iterations of the multipliers in a step, at most; the article has 20, another solver's.",
     )
     tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=1.0e-3, description="Convergence tolerance of the multipliers."

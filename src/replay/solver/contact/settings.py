@@ -67,7 +67,7 @@ class ContactControls:
         Numbers of parts that may touch themselves.
     """
 
-    most_iterations: int = 20
+    most_iterations: int = 200
     tolerance: float = 1e-3
     points: str = "center_plus_corners"
     centre_angle_deg: float = 15.0
