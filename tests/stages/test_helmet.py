@@ -142,12 +142,13 @@ def collapsed(helmet: Model, count: int) -> tuple[Model, list[int]]:
 
 
 def test_wedges_are_listed_by_number_and_too_many_are_refused(tmp_path: Path, helmet: Model) -> None:
-    many, ids = collapsed(helmet, 40)
+    count = len(helmet.hexes) // 18  # more than one in twenty
+    many, ids = collapsed(helmet, count)
     code, checks, report = inspect(tmp_path, write(tmp_path, deck_text(many)))
     assert code == 3
     assert checks["wedge_share"] == "fail"
     assert report["census"]["ids"] == {"wedge": ids}
-    assert report["census"]["kinds"]["hexahedron"] == len(helmet.hexes) - 40
+    assert report["census"]["kinds"]["hexahedron"] == len(helmet.hexes) - count
 
 
 def test_preparing_removes_the_wedges_and_nothing_else(tmp_path: Path, helmet: Model) -> None:

@@ -111,11 +111,11 @@ class Play(Setting):
         return self
 
     @model_validator(mode="after")
-    def _a_wearable_has_no_posterior(self) -> Play:
+    def _clicks_alone_have_a_posterior(self) -> Play:
         asked = self.reconstruction.mode == "posterior" or self.reconstruction.ensemble > 0
         if self.source.kind != "clicks" and asked:
             refuse(
-                "reconstruction asks for the posterior of no clicks",
+                "reconstruction asks for the posterior of a wearable's record, or of none",
                 "clicks: a wearable is read as it is",
                 "remove the block `reconstruction`",
             )
