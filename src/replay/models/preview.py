@@ -70,7 +70,7 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
     figure.suptitle(f"{name}: {len(model.hexes):,} hexahedra, {len(model.nodes):,} nodes", fontsize=14, y=0.975)
     looks = {_look(part) for part in model.parts}
     present = [look for look in _COLOURS if look in looks]
-    columns = len(present) if len(present) < 13 else 7
+    columns = len(present) if len(present) < 12 else 7
     figure.legend(
         handles=[Patch(facecolor=_COLOURS[r], edgecolor="#555555", label=r.replace("_", " ")) for r in present],
         loc="lower center", ncol=columns, frameon=False, fontsize=10, handlelength=1.2, columnspacing=1.4,
@@ -80,8 +80,9 @@ def write_preview(path: str | Path, model: Model, *, dots_per_inch: int = 100) -
 
 
 def _look(part: Part) -> str:
-    """Key of a part's colour: its own name where there is one, its role elsewhere."""
-    return part.name if part.name in _COLOURS else part.role
+    """Key of a part's colour: its own name where there is one, as of the first player; its role elsewhere."""
+    name = part.name.removesuffix("_2")
+    return name if name in _COLOURS else part.role
 
 
 def outer_faces(hexes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
