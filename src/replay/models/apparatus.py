@@ -6,6 +6,7 @@ the circle, and rings around it.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -105,6 +106,7 @@ def apparatus_names() -> tuple[str, ...]:
     return tuple(sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".yaml")))
 
 
+@cache
 def load_apparatus(name: str) -> Apparatus:
     """Read the description of an apparatus that ships.
 
